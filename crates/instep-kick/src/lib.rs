@@ -1,0 +1,1 @@
+//! Kick engines: what turns a request and sensor readings into joint commands.

@@ -1,0 +1,1 @@
+//! From a human clip to a reference that a robot can follow.

@@ -1,0 +1,1 @@
+//! The world: a robot with its real limits, the pitch, a ball whose impacts can be trusted, and the trial.

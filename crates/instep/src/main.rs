@@ -1,0 +1,2 @@
+//! Instep command line.
+fn main() {}
