@@ -3,6 +3,7 @@
 //! - [`clip`]: a human clip, that is a [`clip::Skeleton`] and its frames, whatever file it came from;
 //!   [`asf`] and [`bvh`] read the two usual formats.
 //! - [`landmark`]: which bone of a skeleton is the pelvis, a knee, a toe; where those are at each frame.
+//! - [`despike`]: single-frame spikes of a recording taken out.
 //! - [`contact`] and [`phase`]: when each foot stands, which foot kicks, and the kick's phase times.
 //! - [`reference`]: a robot's motion by joint name, with its contacts, forces and phases: what a retargeter
 //!   writes, a learner tracks and a kick engine plays.
@@ -15,6 +16,7 @@ pub mod asf;
 pub mod bvh;
 pub mod clip;
 pub mod contact;
+pub mod despike;
 mod error;
 pub mod landmark;
 pub mod phase;

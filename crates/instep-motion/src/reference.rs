@@ -3,7 +3,11 @@
 //! World frame: z up, ground at z = 0, x along the aimed direction of the kick, origin on the ground under the
 //! ball's centre. Saved as JSON, one knot a line, so that two references can be compared line by line.
 
+use std::path::Path;
+
 use serde::{Deserialize, Serialize};
+
+use crate::MotionError;
 
 use crate::phase::KickPhases;
 
@@ -93,4 +97,44 @@ pub struct Reference {
 impl Reference {
     /// The layout that this version writes and reads.
     pub const FORMAT: u32 = 1;
+}
+
+impl Reference {
+    /// Reads and validates a reference.
+    ///
+    /// # Errors
+    ///
+    /// [`MotionError`] with file and line or field.
+    pub fn load(path: &Path) -> Result<Self, MotionError> {
+        let _ = path;
+        unimplemented!("body follows")
+    }
+
+    /// Validates and writes the reference, whole or not at all: to a new file in the same folder, then renamed.
+    ///
+    /// # Errors
+    ///
+    /// [`MotionError`] with file and field.
+    pub fn save(&self, path: &Path) -> Result<(), MotionError> {
+        let _ = path;
+        unimplemented!("body follows")
+    }
+
+    /// From the first knot to the last, s.
+    #[must_use]
+    pub fn duration(&self) -> f64 {
+        self.knots.len().saturating_sub(1) as f64 / self.rate
+    }
+
+    /// Position of `name` in [`Self::joint_names`].
+    #[must_use]
+    pub fn joint_index(&self, name: &str) -> Option<usize> {
+        self.joint_names.iter().position(|joint| joint == name)
+    }
+
+    /// The state at the time `t`, s, clamped to the reference. Allocates only while `knot` has not yet the capacity.
+    pub fn sample_into(&self, t: f64, knot: &mut Knot) {
+        let _ = (t, knot);
+        unimplemented!("body follows")
+    }
 }
