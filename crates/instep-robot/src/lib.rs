@@ -1,1 +1,28 @@
-//! A robot: a MuJoCo model and the file that says which part plays which role.
+//! A robot: a MuJoCo model and the file that says which of its parts plays which role.
+//!
+//! [`Robot`] is read once and never changes; [`RobotData`] is the scratch space of one thread, in which
+//! kinematics and dynamics are computed for a state that the caller sets. Loading: [`Robot::load`].
+//!
+//! Conventions, said here once for the whole project:
+//!
+//! - Quaternions are unit, scalar first: w, x, y, z.
+//! - `q` has 7 + n numbers: base position in the world (m), `world_from_base` quaternion, then n joint angles (rad).
+//! - `v` has 6 + n numbers: base linear velocity in the **world** (m/s), base angular velocity in the **base frame**
+//!   (rad/s), then n joint speeds (rad/s). Forces conjugate to `v` are ordered in the same way. (MuJoCo's free joint.)
+//! - Momentum is linear, then angular about the centre of mass, both in world axes.
+//! - Jacobians are row-major slices, 3 x (6 + n): `velocity[i] = sum_j jacobian[i * nv + j] * v[j]`.
+//!
+//! Nothing here simulates: the world with its ball, contacts and noise is instep-sim.
+
+mod capsule;
+pub mod check;
+pub mod control;
+mod data;
+mod error;
+mod robot;
+pub mod settings;
+
+pub use capsule::{SegmentPair, closest_points};
+pub use data::RobotData;
+pub use error::RobotError;
+pub use robot::{ContactPoint, Joint, Leg, LinkPoint, Robot};

@@ -1,0 +1,143 @@
+//! The layout of `robot.toml`: which joint, link, sole and sensor of a model plays which part, with the limits
+//! and gains that a model file cannot say. Read by [`crate::Robot::load`], which checks every name against the model.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+/// A whole `robot.toml`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RobotFile {
+    /// Short name, used in references, policies and tables.
+    pub name: String,
+    /// One line for people: size, weight, whose model.
+    pub title: String,
+    /// Model file (MJCF or URDF), relative to this file.
+    pub model: String,
+    /// The floating base.
+    pub base: BaseFile,
+    /// Joints that share limits and gains; every joint of the model is in exactly one.
+    pub group: Vec<GroupFile>,
+    /// Joint angles of the pose that it stands in, rad; joints not named are at zero.
+    #[serde(default)]
+    pub stand: BTreeMap<String, f64>,
+    /// Both legs.
+    pub leg: LegsFile,
+    /// Contact points of the feet.
+    pub contact: Vec<ContactFile>,
+    /// Pairs of capsules that must not touch.
+    #[serde(default)]
+    pub self_collision: SelfCollisionFile,
+    /// Human landmark (as [`instep_motion::landmark`] names it) to the point that follows it, for retargeting.
+    #[serde(default)]
+    pub landmark: BTreeMap<String, PointFile>,
+}
+
+/// The floating base and the inertial sensor in it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BaseFile {
+    /// The link with the free joint; a URDF's root link gets one.
+    pub link: String,
+    /// Where the inertial sensor sits in that link, m; its axes are the link's.
+    #[serde(default)]
+    pub imu: [f64; 3],
+}
+
+/// Joints of one kind, with their drives.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GroupFile {
+    /// The group's name in reports.
+    pub name: String,
+    /// Its joints.
+    pub joints: Vec<String>,
+    /// Largest torque, N m; where absent, the model's own limit is used (`actuatorfrcrange`, URDF `effort`).
+    pub torque: Option<f64>,
+    /// Largest speed, rad/s.
+    pub speed: f64,
+    /// Share of the speed limit up to which the full torque is available, in [0, 1). From there it falls linearly
+    /// to zero at the limit. 0 is a motor without current limit, 0.9 one whose current limit binds first.
+    pub corner: f64,
+    /// Drive stiffness, N m/rad. Larger follows closer and shakes sooner.
+    pub kp: f64,
+    /// Drive damping, N m s/rad.
+    pub kd: f64,
+}
+
+/// Both legs.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LegsFile {
+    /// Left leg.
+    pub left: LegFile,
+    /// Right leg.
+    pub right: LegFile,
+}
+
+/// The parts of one leg.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LegFile {
+    /// Joint that turns the leg about its own axis (on NAO the coupled hip yaw-pitch).
+    pub hip_yaw: String,
+    /// Joint that lifts the leg sideways.
+    pub hip_roll: String,
+    /// Joint that lifts the leg forward.
+    pub hip_pitch: String,
+    /// Knee.
+    pub knee: String,
+    /// Ankle pitch.
+    pub ankle_pitch: String,
+    /// Ankle roll.
+    pub ankle_roll: String,
+    /// Toe, where there is one.
+    pub toe: Option<String>,
+    /// Link between hip and knee.
+    pub thigh: String,
+    /// Link between knee and ankle.
+    pub shank: String,
+    /// Link that carries the sole.
+    pub foot: String,
+    /// Link in front of the toe joint, where there is one.
+    pub toe_link: Option<String>,
+    /// Centre of the sole on the ground, in the foot's frame, m.
+    pub sole: [f64; 3],
+    /// Geoms of the model that may strike the ball, the usual striking part first.
+    pub strike: Vec<String>,
+}
+
+/// One contact point: a small sphere fixed to a link.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ContactFile {
+    /// Its name in references and reports.
+    pub name: String,
+    /// `left` or `right`.
+    pub leg: instep_motion::phase::Side,
+    /// The link it is fixed to.
+    pub link: String,
+    /// Sphere's centre in the link's frame, m.
+    pub point: [f64; 3],
+    /// Sphere's radius, m.
+    pub radius: f64,
+}
+
+/// Self-collision.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SelfCollisionFile {
+    /// Pairs of geom names; capsules or spheres.
+    pub pairs: Vec<[String; 2]>,
+}
+
+/// A point fixed to a link.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PointFile {
+    /// The link.
+    pub link: String,
+    /// The point in the link's frame, m.
+    pub point: [f64; 3],
+}
