@@ -22,5 +22,6 @@ pub mod landmark;
 pub mod phase;
 pub mod reference;
 pub mod spline;
+mod text;
 
 pub use error::MotionError;
