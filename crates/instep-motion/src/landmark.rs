@@ -4,16 +4,17 @@
 //! Mixamo and LAFAN, the older "LeftHip/LeftKnee" one) finds the bones; everything after that is by [`Landmark`] and
 //! [`Segment`]. Conventions are tried as a whole, since "LeftHip" is a joint in one and a hip bone in another.
 //!
-//! The heel and the sole are derived, no file has them. They rest on one assumption: **in the zero pose the feet
-//! stand flat**, true of CMU's skeletons and of T-poses. The sole is then the horizontal plane [`SOLE_DEPTH`] below
-//! the ball of the foot, and the heel lies [`HEEL_FRACTION`] of the distance from ankle to toe tip behind the ankle.
-//! A zero pose with pointed feet would put the heel elsewhere; nothing here detects that.
+//! The heel and the sole are derived, no file has them: the sole is a plane [`SOLE_DEPTH`] below the ball of the foot,
+//! and the heel lies [`HEEL_FRACTION`] of the distance from ankle to toe tip behind the ankle. The plane's slope
+//! relative to the foot bone is that of the zero pose (feet flat, true of T-poses and roughly of CMU's skeletons)
+//! until [`Landmarks::calibrated`] takes it from a clip in which the feet stand.
 
 use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::MotionError;
-use crate::clip::{BonePoses, Skeleton};
+use crate::clip::{BonePoses, Clip, Skeleton};
 use crate::phase::Side;
+use crate::track::{median, path, quantile, speeds};
 
 /// How far the sole lies below the joint at the ball of the foot, m.
 pub const SOLE_DEPTH: f64 = 0.02;
@@ -276,6 +277,8 @@ struct Sole {
     heel: Point,
     ball: Point,
     toe_tip: Point,
+    /// Turns z into the sole's normal, the short way.
+    foot_from_sole: UnitQuaternion<f64>,
 }
 
 /// The landmarks of one skeleton. Bone indices inside: use it only with poses of that skeleton.
@@ -347,7 +350,8 @@ impl Landmarks {
         let hand_tips =
             both(&|side| tip(names.finger(skeleton, side).unwrap_or_else(|| bones[Segment::Hand(side).slot()])));
         let soles = [Side::Left, Side::Right].map(|side| {
-            sole(&zero, bones[Segment::Foot(side).slot()], bones[Segment::Toes(side).slot()], &toe_tips[slot(side)])
+            let [foot, toes] = [Segment::Foot(side), Segment::Toes(side)].map(|segment| bones[segment.slot()]);
+            Sole::new(&zero, [foot, toes], &toe_tips[slot(side)], Vector3::z())
         });
         let head = tip(bones[Segment::Head.slot()]);
         Ok(Self { convention: names.convention, bones, head, toe_tips, hand_tips, soles })
@@ -399,6 +403,44 @@ impl Landmarks {
         SolePoints { heel: sole.heel.at(poses), ball: sole.ball.at(poses), toe_tip: sole.toe_tip.at(poses) }
     }
 
+    /// `world_from_sole`: the foot's rotation as it would be, had the foot stood flat in the zero pose. It turns about z
+    /// only while the foot stands flat. No allocation.
+    #[must_use]
+    pub fn sole_rotation(&self, poses: &BonePoses, side: Side) -> UnitQuaternion<f64> {
+        self.rotation(poses, Segment::Foot(side)) * self.soles[slot(side)].foot_from_sole
+    }
+
+    /// The same landmarks with each sole's slope taken from the frames of `clip` in which that foot stands: its ball
+    /// is slower than 0.2 m/s and the ankle is within 1 cm of its lowest decile among these. A foot that stands for
+    /// less than 0.1 s altogether, or by more than 30 degrees off its zero pose, keeps its sole.
+    ///
+    /// # Panics
+    ///
+    /// If `clip` fails [`Clip::validate`] or is not of this skeleton.
+    #[must_use]
+    pub fn calibrated(mut self, clip: &Clip) -> Self {
+        const SLOW: f64 = 0.2;
+        const NEAR: f64 = 0.01;
+        let zero = clip.skeleton.zero_poses();
+        for side in [Side::Left, Side::Right] {
+            let balls = path(clip, |poses| self.position(poses, Landmark::ToeBase(side)));
+            let ankles = path(clip, |poses| self.position(poses, Landmark::Ankle(side)));
+            let slow: Vec<bool> = speeds(&balls, clip.rate, 0.05).iter().map(|speed| *speed < SLOW).collect();
+            let resting = ankles.iter().zip(&slow).filter(|(_, slow)| **slow).map(|(ankle, _)| ankle.z).collect();
+            let low = quantile(resting, 0.1) + NEAR;
+            let ups = path(clip, |poses| self.rotation(poses, Segment::Foot(side)).inverse() * Vector3::z());
+            let flat = |i: &usize| slow[*i] && ankles[*i].z <= low;
+            let flat: Vec<Vector3<f64>> = (0..ups.len()).filter(flat).map(|i| ups[i]).collect();
+            let up = Vector3::from_fn(|axis, _| median(flat.iter().map(|up| up[axis]).collect()));
+            let up = up.try_normalize(1e-6).filter(|up| up.z > 30.0_f64.to_radians().cos());
+            if let (Some(up), true) = (up, flat.len() as f64 >= 0.1 * clip.rate) {
+                let bones = [Segment::Foot(side), Segment::Toes(side)].map(|segment| self.bone(segment));
+                self.soles[slot(side)] = Sole::new(&zero, bones, &self.toe_tips[slot(side)], up);
+            }
+        }
+        self
+    }
+
     /// Knee flexion on `side`, rad: 0 with thigh and shank in line, in `0..=pi`.
     #[must_use]
     pub fn knee_flexion(&self, poses: &BonePoses, side: Side) -> f64 {
@@ -417,13 +459,22 @@ impl Landmarks {
     }
 }
 
-/// The sole of one foot, from the zero pose (see the module's assumption).
-fn sole(zero: &BonePoses, foot: usize, toes: usize, toe_tip: &Point) -> Sole {
-    let (ankle, ball, tip) = (zero.origins[foot], zero.origins[toes], toe_tip.at(zero));
-    let plane = ball.z - SOLE_DEPTH;
-    let forward = Vector3::new(tip.x - ankle.x, tip.y - ankle.y, 0.0);
-    let heel = ankle - forward * HEEL_FRACTION;
-    let on_sole =
-        |bone: usize, p: Vector3<f64>| Point { bone, local: Vector3::new(p.x, p.y, plane) - zero.origins[bone] };
-    Sole { heel: on_sole(foot, heel), ball: on_sole(foot, ball), toe_tip: on_sole(toes, tip) }
+impl Sole {
+    /// The sole of one foot whose plane has the unit normal `up` in the foot's frame.
+    fn new(zero: &BonePoses, [foot, toes]: [usize; 2], toe_tip: &Point, up: Vector3<f64>) -> Self {
+        let (ankle, ball, tip) = (zero.origins[foot], zero.origins[toes], toe_tip.at(zero));
+        // In the zero pose every frame is the world's, so a vector there is a vector in the bone's frame.
+        let level = |v: Vector3<f64>| v - up * up.dot(&v);
+        let heel = ankle - level(tip - ankle) * HEEL_FRACTION;
+        let on_sole = |bone: usize, p: Vector3<f64>| {
+            let height = up.dot(&(p - ball)) + SOLE_DEPTH;
+            Point { bone, local: p - up * height - zero.origins[bone] }
+        };
+        Self {
+            heel: on_sole(foot, heel),
+            ball: on_sole(foot, ball),
+            toe_tip: on_sole(toes, tip),
+            foot_from_sole: UnitQuaternion::rotation_between(&Vector3::z(), &up).unwrap_or_default(),
+        }
+    }
 }

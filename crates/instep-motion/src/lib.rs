@@ -23,5 +23,6 @@ pub mod phase;
 pub mod reference;
 pub mod spline;
 mod text;
+mod track;
 
 pub use error::MotionError;
