@@ -3,7 +3,7 @@
 //! A made-up figure of capsules walks up to a ball and kicks it. Nothing is simulated: the motion is drawn with sines,
 //! to show every part of a page and to have one for the tests that look at pixels.
 
-use instep_report::mcap::{Joints, LinkPose, Recording};
+use instep_report::mcap::{Imu, Joints, LinkPose, Recording};
 use instep_report::*;
 
 /// Frames per second of the demo.
@@ -71,6 +71,12 @@ fn between(from: V3, to: V3) -> Pose {
     Pose { position: middle, rotation: [(angle / 2.0).cos() as f32, 0.0, (angle / 2.0).sin() as f32, 0.0] }
 }
 
+/// Turned so that the long axis lies along y.
+fn across(position: V3) -> Pose {
+    let half = std::f32::consts::FRAC_1_SQRT_2;
+    Pose { position: position.map(|x| x as f32), rotation: [half, half, 0.0, 0.0] }
+}
+
 /// Poses of the figure's parts at a time, in the order of `figure`.
 fn poses(t: f64) -> Vec<Pose> {
     let s = stance(t);
@@ -78,9 +84,11 @@ fn poses(t: f64) -> Vec<Pose> {
     let pelvis = [s.forward, 0.0, s.height + 0.05];
     let neck = add(pelvis, [0.42 * s.lean.sin(), 0.0, 0.42 * s.lean.cos()]);
     let mut poses = vec![
-        between(add(pelvis, [0.0, 0.0, 0.02]), neck),
-        between(pelvis, add(pelvis, [0.0, 0.0, 0.01])),
-        between(add(neck, [0.0, 0.0, 0.12]), add(neck, [0.01, 0.0, 0.2])),
+        between(pelvis, add(neck, [0.0, 0.0, -0.12])),
+        across(add(neck, [0.0, 0.0, -0.07])),
+        across(pelvis),
+        between(neck, add(neck, [0.0, 0.0, 0.1])),
+        between(add(neck, [0.01, 0.0, 0.12]), add(neck, [0.015, 0.0, 0.18])),
     ];
     for side in 0..2 {
         let y = if side == 0 { 1.0 } else { -1.0 };
@@ -108,9 +116,11 @@ fn poses(t: f64) -> Vec<Pose> {
 fn figure(name: &str, times: &[f64], tint: impl Fn(Color) -> Color, delay: f64) -> Actor {
     let capsule = |radius: f32, length: f64| Shape::Capsule { radius, half_length: (length / 2.0) as f32 };
     let mut looks = vec![
-        (Shape::Box { half_extents: [0.075, 0.12, 0.19] }, Color::SHELL),
-        (Shape::Box { half_extents: [0.07, 0.11, 0.06] }, Color::JOINT),
-        (Shape::Capsule { radius: 0.075, half_length: 0.03 }, Color::SHELL),
+        (Shape::Ellipsoid { radii: [0.085, 0.125, 0.2] }, Color::SHELL),
+        (Shape::Capsule { radius: 0.075, half_length: 0.09 }, Color::SHELL),
+        (Shape::Capsule { radius: 0.062, half_length: 0.06 }, Color::JOINT),
+        (Shape::Cylinder { radius: 0.035, half_length: 0.05 }, Color::JOINT),
+        (Shape::Capsule { radius: 0.072, half_length: 0.03 }, Color::SHELL),
     ];
     for leg in [Color::BLUE, Color::ORANGE] {
         looks.push((capsule(0.055, THIGH), leg));
@@ -185,7 +195,7 @@ fn report() -> Report {
     let mut robot = figure("Robot", &times, |color| color, 0.0);
     for (side, name, color) in [(0, "Left sole force", Color::GREEN), (1, "Right sole force", Color::VIOLET)] {
         let frames = times.iter().map(|&t| {
-            let foot = poses(t)[5 + 5 * side].position;
+            let foot = poses(t)[7 + 5 * side].position;
             let force = ground_force(t)[side] as f32;
             ArrowFrame { origin: [foot[0], foot[1], 0.0], vector: [-0.06 * force, 0.0, force] }
         });
@@ -340,6 +350,13 @@ fn recording() -> Result<Recording, ReportError> {
         recording.links(t, &poses)?;
         let (position, spin) = ball(t);
         recording.ball(t, position, [(spin / 2.0).cos(), 0.0, (spin / 2.0).sin(), 0.0])?;
+        let imu = Imu {
+            frame: "torso",
+            rotation: Some([(s.lean / 2.0).cos(), 0.0, (s.lean / 2.0).sin(), 0.0]),
+            angular_velocity: [0.0; 3],
+            linear_acceleration: [-9.81 * s.lean.sin(), 0.0, 9.81 * s.lean.cos()],
+        };
+        recording.imu(t, &imu)?;
     }
     recording.event(IMPACT, "impact")?;
     Ok(recording)

@@ -30,7 +30,7 @@ pub struct Event {
 /// Where the view starts. All angles are radians.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Camera {
-    /// The point looked at, world frame, metres. While following, it is relative to the first actor's ground point.
+    /// The point looked at in the first frame, world frame, metres; while following it moves along with the first actor.
     pub target: [f32; 3],
     /// From target to eye, metres.
     pub distance: f32,

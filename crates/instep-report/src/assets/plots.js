@@ -3,7 +3,7 @@ const PALETTE = ["#2f6fde", "#e8743b", "#2f9e6b", "#8b5fd0", "#c2488a", "#1899a8
 
 function createPlots(container, plots, replay, onSeek) {
   const NS = "http://www.w3.org/2000/svg";
-  const MARGIN = { top: 18, right: 10, bottom: 20 };
+  const MARGIN = { top: 18, right: 10, bottom: 20, bottomWithLabel: 36 };
   let time = null, hover = null, serial = 0;
 
   function node(parent, name, attributes = {}, text) {
@@ -112,11 +112,12 @@ function createPlots(container, plots, replay, onSeek) {
       if (!width || !height) return;
       svg.replaceChildren();
       svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
-      const yTicks = ticks(range.y0, range.y1, (height - 40) / 34);
+      const yTicks = ticks(range.y0, range.y1, (height - 40) / 26);
       decimals = Math.min(6, Math.max(0, 2 - Math.floor(Math.log10(range.y1 - range.y0) + 1e-9)));
       const labels = yTicks.values.map(v => written(v, yTicks.decimals));
       left = 12 + 6.6 * Math.max(2, ...labels.map(l => l.length));
-      const right = width - MARGIN.right, bottom = height - MARGIN.bottom, top = MARGIN.top;
+      const xName = plot.time ? "" : plot.xLabel;
+      const right = width - MARGIN.right, bottom = height - (xName ? MARGIN.bottomWithLabel : MARGIN.bottom), top = MARGIN.top;
       toX = x => left + ((x - range.x0) / (range.x1 - range.x0)) * (right - left);
       fromX = px => range.x0 + math.clamp((px - left) / (right - left), 0, 1) * (range.x1 - range.x0);
       toY = y => bottom - ((y - range.y0) / (range.y1 - range.y0)) * (bottom - top);
@@ -125,7 +126,8 @@ function createPlots(container, plots, replay, onSeek) {
       for (const [label, a, b] of plot.regions) {
         const xa = math.clamp(toX(Math.min(a, b)), left, right), xb = math.clamp(toX(Math.max(a, b)), left, right);
         if (xb <= xa) continue;
-        node(svg, "rect", { class: "region", x: xa, y: top, width: xb - xa, height: bottom - top });
+        const band = node(svg, "rect", { class: "region", x: xa, y: top, width: xb - xa, height: bottom - top });
+        node(band, "title", {}, label);
         for (const x of [xa, xb]) node(svg, "line", { class: "region-edge", x1: x, x2: x, y1: top, y2: bottom });
         if (label.length * 6 < xb - xa) node(svg, "text", { class: "region-label", x: (xa + xb) / 2, y: top - 6, "text-anchor": "middle" }, label);
       }
@@ -134,15 +136,14 @@ function createPlots(container, plots, replay, onSeek) {
         node(svg, "text", { x: left - 6, y: toY(v) + 3.8, "text-anchor": "end" }, labels[i]);
       });
       const xTicks = ticks(range.x0, range.x1, (right - left) / 64);
-      const xName = plot.time ? "s" : plot.xLabel;
       xTicks.values.forEach((v, i) => {
         const last = i === xTicks.values.length - 1, x = toX(v);
         const text = written(v, xTicks.decimals) + (last && plot.time ? " s" : "");
         const anchor = x + 3.4 * text.length > width ? "end" : "middle";
         node(svg, "line", { class: "grid", x1: x, x2: x, y1: bottom, y2: bottom + 3 });
-        node(svg, "text", { x: anchor === "end" ? width - 1 : x, y: height - 5, "text-anchor": anchor }, text);
+        node(svg, "text", { x: anchor === "end" ? width - 1 : x, y: bottom + 15, "text-anchor": anchor }, text);
       });
-      if (!plot.time && xName) node(svg, "text", { class: "halo", x: right, y: bottom - 5, "text-anchor": "end" }, xName);
+      if (xName) node(svg, "text", { x: (left + right) / 2, y: height - 5, "text-anchor": "middle" }, xName);
       if (plot.time && replay)
         for (const [t, label] of replay.events) {
           if (t < range.x0 || t > range.x1) continue;
@@ -152,11 +153,14 @@ function createPlots(container, plots, replay, onSeek) {
       const lines = node(svg, "g", { "clip-path": `url(#${clip})` });
       for (const s of [...plot.series].reverse())
         node(lines, "path", { class: "series", d: path(s, toX, toY, right - left), stroke: s.color, ...(s.dashed ? { "stroke-dasharray": "5 4" } : {}) });
+      // Whether a line runs through the place above a limit's right end, where its label would stand.
+      const crowded = (text, y) => y + 16 < bottom && plot.series.some(s => s.y.some((v, i) =>
+        v !== null && s.x[i] !== null && toX(s.x[i]) > right - 7 * text.length && toY(v) < y - 2 && toY(v) > y - 17));
       for (const [label, v] of plot.limits) {
         const inside = v >= range.y0 && v <= range.y1, y = inside ? toY(v) : v > range.y1 ? top + 4 : bottom - 4;
         const text = inside ? label : `${v > range.y1 ? "\u2191" : "\u2193"} ${label} ${written(v, Math.min(decimals, 2))}`;
         if (inside) node(svg, "line", { class: "limit", x1: left, x2: right, y1: y, y2: y });
-        const under = !inside ? v > range.y1 : y - top < 14;
+        const under = inside ? crowded(text, y) || y - top < 14 : v > range.y1;
         node(svg, "text", { class: "limit-label halo", x: right - 3, y: under ? y + 12 : y - 4, "text-anchor": "end" }, text);
       }
       hoverLine = node(svg, "line", { class: "hover", y1: top, y2: bottom, visibility: "hidden" });
@@ -186,7 +190,7 @@ function createPlots(container, plots, replay, onSeek) {
       });
     }
     // The widest value a series can show keeps the legend from jumping.
-    for (const s of plot.series) s.readout.style.minWidth = "3.6em";
+    for (const s of plot.series) s.readout.style.minWidth = "3.2em";
 
     const xOf = event => fromX(event.clientX - svg.getBoundingClientRect().left);
     const setOver = x => { if (plot.time) api.setHover(x); else { ownHover = x; update(); } };

@@ -12,7 +12,7 @@ vec3 turned(vec3 v) { return v + 2.0 * cross(uRotation.xyz, cross(uRotation.xyz,
 vec3 placed() { return uPosition + turned(aPosition.xyz * uSize + vec3(0.0, 0.0, aPosition.w * uHalf)); }
 `;
   const light = `
-uniform mat4 uLight; uniform vec3 uSun, uEye, uSkyColor, uGroundColor; uniform sampler2DShadow uShadow;
+uniform mat4 uLight; uniform vec3 uSun, uSunColor, uEye, uSkyColor, uGroundColor; uniform sampler2DShadow uShadow;
 uniform float uTexel; // radius of the blur, in shadow map units
 // 1 in the sun, 0 in the shade; 16 taps on a spiral make the edge soft.
 float sunlit(vec3 world, vec3 normal) {
@@ -83,7 +83,7 @@ void main() {
   vec3 ambient = mix(uGroundColor, uSkyColor, n.z * 0.5 + 0.5) * near;
   float gloss = pow(max(dot(n, normalize(uSun + view)), 0.0), 48.0) * 0.22 * step(0.001, sun) * min(sun * 3.0, 1.0);
   float rim = pow(1.0 - max(dot(n, view), 0.0), 4.0) * 0.10;
-  vec3 c = albedo * (ambient + vec3(1.0, 0.97, 0.92) * sun * 1.05) + gloss + rim * uSkyColor;
+  vec3 c = albedo * (ambient + uSunColor * sun) + gloss + rim * uSkyColor;
   c = mix(c, albedo, uGlow);
   color = vec4(show(c) * uColor.a, uColor.a);
 }`,
@@ -140,7 +140,7 @@ void main() {
     albedo = mix(albedo, grass, smoothstep(-size, size, min(inside.x, inside.y)));
   }
   float sun = uSun.z * sunlit(vWorld, vec3(0.0, 0.0, 1.0));
-  vec3 c = albedo * (uSkyColor * 0.85 + vec3(1.0, 0.97, 0.92) * sun * 1.05);
+  vec3 c = albedo * (uSkyColor * 0.85 + uSunColor * sun);
   float alpha = 1.0 - smoothstep(0.35, 1.0, far);
   color = vec4(show(c) * alpha, alpha);
 }`,

@@ -2,7 +2,7 @@
 function createView(canvas, replay, onUsed) {
   const gl = canvas.getContext("webgl2", { antialias: true, alpha: true, premultipliedAlpha: true });
   if (!gl) throw new Error("WebGL 2 is not available");
-  const SUN = math.unit([-0.35, -0.55, 1.1]), SHADOW_SIZE = 2048, FIELD_OF_VIEW = 0.6;
+  const SUN = math.unit([0.5, -0.75, 1.15]), SHADOW_SIZE = 2048, FIELD_OF_VIEW = 0.6;
   const linear = c => Math.pow(c / 255, 2.2);
 
   // ---- Programs and meshes -------------------------------------------------------------------------------------
@@ -92,7 +92,7 @@ function createView(canvas, replay, onUsed) {
     const length = math.length(vector);
     if (!(length > 0.01)) return [];
     const direction = math.unit(vector), rotation = math.quaternionFromZ(direction);
-    const r = 0.009, head = Math.min(0.075, length * 0.45), shaft = length - head;
+    const r = 0.011, head = Math.min(0.075, length * 0.45), shaft = length - head;
     const common = { rotation, half: 0, color: color(arrow.color), football: 0, glow: 0.55 };
     return [
       { ...common, mesh: mesh.cylinder, size: [r, r, shaft / 2], position: math.add(origin, math.scale(direction, shaft / 2)) },
@@ -114,18 +114,20 @@ function createView(canvas, replay, onUsed) {
   // ---- Camera --------------------------------------------------------------------------------------------------
   // The ground point under the first actor, evened out over 0.4 s so that the camera does not sway with each step.
   const lead = replay.actors[0];
-  function leadCenter(t) {
+  const path = replay.times.map(t => {
     const poses = lead ? lead.parts.map(part => readPose(part, lead.offset, t)).filter(Boolean) : [];
-    if (!poses.length) return [0, 0, 0];
     const sum = poses.reduce((s, pose) => math.add(s, pose.position), [0, 0, 0]);
-    return [sum[0] / poses.length, sum[1] / poses.length, 0];
-  }
-  const followed = t => {
-    const n = 8, last = replay.times[replay.times.length - 1] || 0;
+    return poses.length ? [sum[0] / poses.length, sum[1] / poses.length, 0] : [0, 0, 0];
+  });
+  function followed(t) {
+    const n = 8, last = path.length - 1;
     let sum = [0, 0, 0];
-    for (let i = 0; i <= n; i++) sum = math.add(sum, leadCenter(math.clamp(t + (i / n - 0.5) * 0.4, replay.times[0] || 0, last)));
+    for (let k = 0; k <= n; k++) {
+      const [i, s] = math.frameAt(replay.times, t + (k / n - 0.5) * 0.4), a = path[i] || [0, 0, 0], b = path[Math.min(i + 1, last)] || a;
+      sum = math.add(sum, math.add(math.scale(a, 1 - s), math.scale(b, s)));
+    }
     return math.scale(sum, 1 / (n + 1));
-  };
+  }
   // A first view that shows the first actor whole, and what stands close to it.
   function firstView() {
     const start = replay.times[0] || 0, base = followed(start);
@@ -222,8 +224,9 @@ function createView(canvas, replay, onUsed) {
       gl.uniform1i(at.uShadow, 0);
       gl.uniform1f(at.uTexel, 0.014 / reach);
       gl.uniform3fv(at.uSun, SUN);
+      gl.uniform3fv(at.uSunColor, night ? [0.84, 0.83, 0.81] : [1.05, 1.02, 0.97]);
       gl.uniform3fv(at.uEye, eye);
-      gl.uniform3fv(at.uSkyColor, night ? [0.34, 0.40, 0.50] : [0.56, 0.62, 0.70]);
+      gl.uniform3fv(at.uSkyColor, night ? [0.30, 0.35, 0.44] : [0.56, 0.62, 0.70]);
       gl.uniform3fv(at.uGroundColor, pitch ? [0.10, 0.16, 0.10] : [0.20, 0.20, 0.21]);
     }
     gl.enable(gl.BLEND);
@@ -232,6 +235,12 @@ function createView(canvas, replay, onUsed) {
     gl.useProgram(solid.p);
     drawItems(scene.solid);
     drawItems(scene.arrows);
+    // The part of an arrow that is inside or behind something shows through faintly.
+    gl.depthFunc(gl.GREATER);
+    gl.depthMask(false);
+    drawItems(scene.arrows.map(item => ({ ...item, color: [...item.color.slice(0, 3), 0.45 * item.color[3]] })));
+    gl.depthMask(true);
+    gl.depthFunc(gl.LESS);
     // Ghosts: depth first, then colour, so that only their nearest surface shows.
     gl.colorMask(false, false, false, false);
     drawItems(scene.ghost);
@@ -265,7 +274,7 @@ function createView(canvas, replay, onUsed) {
   const pointers = new Map();
   const orbit = (dx, dy) => {
     camera.azimuth -= dx * 0.007;
-    camera.elevation = math.clamp(camera.elevation + dy * 0.006, -0.05, 1.55);
+    camera.elevation = math.clamp(camera.elevation + dy * 0.006, -0.05, 1.569);
   };
   const pan = (dx, dy) => {
     const s = (2 * camera.distance * Math.tan(FIELD_OF_VIEW / 2)) / Math.max(1, canvas.clientHeight);
@@ -306,7 +315,7 @@ function createView(canvas, replay, onUsed) {
   new ResizeObserver(redraw).observe(canvas);
   dark.addEventListener("change", redraw);
 
-  const presets = { side: [-Math.PI / 2, 0.12], front: [0, 0.12], top: [-Math.PI / 2, 1.54] };
+  const presets = { side: [-Math.PI / 2, 0.12], front: [0, 0.12], top: [-Math.PI / 2, 1.569] };
   return {
     setTime(t) { now = t; redraw(); },
     look(name) {

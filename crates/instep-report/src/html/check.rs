@@ -49,7 +49,21 @@ fn check_replay(replay: &Replay) -> Result<(), ReportError> {
         let place = || format!("replay event {:?}", event.label);
         ensure(event.time.is_finite(), place, || (format!("time {}", event.time), "a finite time".into()))?;
     }
+    if let Some(camera) = &replay.camera {
+        let finite =
+            [camera.distance, camera.azimuth, camera.elevation].into_iter().chain(camera.target).all(f32::is_finite);
+        ensure(
+            finite && camera.distance > 0.0,
+            || "replay.camera".into(),
+            || (format!("{camera:?}"), "finite numbers and a positive distance".into()),
+        )?;
+    }
     for actor in &replay.actors {
+        ensure(
+            actor.offset.iter().all(|x| x.is_finite()),
+            || format!("replay actor {:?}, offset", actor.name),
+            || (format!("{:?}", actor.offset), "finite numbers".into()),
+        )?;
         for (index, part) in actor.parts.iter().enumerate() {
             let place = || format!("replay actor {:?}, part {index}", actor.name);
             frame_count(part.poses.len(), &place)?;
@@ -75,6 +89,9 @@ fn check_replay(replay: &Replay) -> Result<(), ReportError> {
         for arrow in &actor.arrows {
             let place = || format!("replay actor {:?}, arrow {:?}", actor.name, arrow.name);
             frame_count(arrow.frames.len(), &place)?;
+            ensure(arrow.metres_per_unit.is_finite(), place, || {
+                (format!("{} metres per unit", arrow.metres_per_unit), "a finite scale".into())
+            })?;
             for (frame, value) in arrow.frames.iter().enumerate() {
                 let place = || format!("{}, frame {frame}", place());
                 ensure(value.origin.iter().chain(&value.vector).all(|x| x.is_finite()), place, || {

@@ -157,7 +157,7 @@ fn a_place_that_cannot_be_written_is_named_and_left_as_it_was() {
 #[test]
 fn what_does_not_fit_is_named() {
     type Spoil = fn(&mut Report);
-    let cases: [(Spoil, &str); 9] = [
+    let cases: [(Spoil, &str); 12] = [
         (
             |r| {
                 r.tables[0].rows[0].pop();
@@ -175,6 +175,21 @@ fn what_does_not_fit_is_named() {
         (
             |r| r.replay.as_mut().unwrap().actors[0].arrows[0].frames[0].vector[1] = f32::NAN,
             "replay actor \"Ball\", arrow \"force\", frame 0",
+        ),
+        (
+            |r| r.replay.as_mut().unwrap().actors[0].arrows[0].metres_per_unit = f32::NAN,
+            "replay actor \"Ball\", arrow \"force\": NaN metres per unit; wanted a finite scale",
+        ),
+        (
+            |r| r.replay.as_mut().unwrap().actors[0].offset[2] = f32::NAN,
+            "replay actor \"Ball\", offset: [0.0, 0.0, NaN]; wanted finite numbers",
+        ),
+        (
+            |r| {
+                r.replay.as_mut().unwrap().camera =
+                    Some(Camera { target: [0.0; 3], distance: 0.0, azimuth: 0.0, elevation: 0.0 })
+            },
+            "replay.camera: Camera {",
         ),
         (|r| r.replay.as_mut().unwrap().times[4] = 0.0, "replay.times: value 4 is 0, after 0.03"),
         (|r| r.replay.as_mut().unwrap().times.clear(), "replay.times: no frame"),
