@@ -204,7 +204,7 @@ fn report() -> Report {
     }
     let reference = figure("Reference", &times, |_| Color::rgb(0x7f8ea3).with_alpha(0.35), 0.04);
 
-    let knee = |t: f64| 14.0 * (t * 9.0).sin() * 0.5 + 38.0 * bump(t, IMPACT - 0.08, 0.05) + 6.0;
+    let knee = |t: f64| 14.0 * (t * 9.0).sin() * 0.5 + 42.5 * bump(t, IMPACT - 0.08, 0.05) + 6.0;
     let mut ground = Plot {
         title: "Ground force".into(),
         y_label: "N".into(),
