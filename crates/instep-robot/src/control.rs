@@ -62,10 +62,11 @@ pub trait Controller {
 }
 
 /// The least and the greatest torque (N m) that `joint`'s motor can give at `speed` (rad/s): full up to the corner
-/// speed, then falling linearly to zero at the speed limit. Braking always has the full torque.
+/// speed, then falling linearly to zero at the speed limit. Beyond the limit the same line goes on below zero, as the
+/// back-EMF of a real motor does: whatever drives the joint too fast is braked. Braking always has the full torque.
 #[must_use]
 pub fn torque_range(joint: &Joint, speed: f64) -> [f64; 2] {
-    let share = |toward: f64| ((1.0 - toward / joint.speed) / (1.0 - joint.corner)).clamp(0.0, 1.0);
+    let share = |toward: f64| ((1.0 - toward / joint.speed) / (1.0 - joint.corner)).clamp(-1.0, 1.0);
     [-joint.torque * share(-speed), joint.torque * share(speed)]
 }
 

@@ -1,0 +1,189 @@
+//! Every constant of the world, each in one place, with its source. The defaults are a FIFA size-5 ball on short
+//! artificial turf; `validate` refuses what cannot be.
+
+use serde::{Deserialize, Serialize};
+
+use crate::SimError;
+
+/// The world's constants.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct WorldSettings {
+    /// The ground.
+    pub pitch: Pitch,
+    /// The ball.
+    pub ball: Ball,
+    /// Foot on ball.
+    pub impact: ImpactLaw,
+    /// Time steps.
+    pub step: Step,
+    /// Sensor noise and delay.
+    pub sensors: SensorNoise,
+}
+
+/// The ground.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Pitch {
+    /// Sliding friction between sole and ground, above 0. Lower is more slippery.
+    pub friction: f64,
+    /// Time constant of the contact between sole and ground, s, at least 0.004. Larger is softer.
+    pub softness: f64,
+    /// Sliding friction between ball and ground.
+    pub ball_friction: f64,
+    /// Deceleration of a ball that rolls, m/s^2. 0.3 to 0.57 on robot soccer turf (facts/physics-of-the-kick.md).
+    pub rolling_deceleration: f64,
+    /// Rebound of the ball from the ground: contact time, s, and restitution. FIFA's rebound test from 2 m asks for
+    /// 1.25 to 1.55 m, restitution 0.79 to 0.88.
+    pub rebound: ImpactLaw,
+}
+
+impl Default for Pitch {
+    fn default() -> Self {
+        Self {
+            friction: 0.9,
+            softness: 0.008,
+            ball_friction: 0.6,
+            rolling_deceleration: 0.4,
+            rebound: ImpactLaw { contact_time: 0.016, restitution: 0.82, friction: 0.6 },
+        }
+    }
+}
+
+/// The ball: a hollow sphere.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Ball {
+    /// Mass, kg. FIFA size 5: 0.43.
+    pub mass: f64,
+    /// Radius, m. FIFA size 5: 0.11.
+    pub radius: f64,
+}
+
+impl Default for Ball {
+    fn default() -> Self {
+        Self { mass: 0.43, radius: 0.11 }
+    }
+}
+
+/// A collision with the ball, as [`crate::contact_law`] turns it into MuJoCo's terms.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ImpactLaw {
+    /// Half period of the undamped contact, s: how long an undamped collision of free bodies lasts.
+    pub contact_time: f64,
+    /// Coefficient of restitution of two free bodies, in (0, 1).
+    pub restitution: f64,
+    /// Sliding friction.
+    pub friction: f64,
+}
+
+impl Default for ImpactLaw {
+    /// Foot on ball: 9 ms and 0.70. Measured with humans: under 10 ms, 0.5 to 0.65, falling with speed (Andersen 2008).
+    fn default() -> Self {
+        Self { contact_time: 0.009, restitution: 0.70, friction: 0.5 }
+    }
+}
+
+/// Time steps, s. The near step holds while the gap between ball and any striking geom is under `near_distance` (m),
+/// so that a contact never starts inside a far step: that is what makes a soft contact gain energy.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Step {
+    /// Step away from the ball, s; also the period at which commands are taken.
+    pub far: f64,
+    /// Step near the ball, s; the far step is a whole multiple of it.
+    pub near: f64,
+    /// Gap that counts as near, m. More than twice the fastest approach times the far step.
+    pub near_distance: f64,
+}
+
+impl Default for Step {
+    fn default() -> Self {
+        Self { far: 0.002, near: 0.00025, near_distance: 0.08 }
+    }
+}
+
+impl Step {
+    /// How many near steps make a far one.
+    #[must_use]
+    pub fn near_per_far(&self) -> usize {
+        // Validated to be a small whole number.
+        (self.far / self.near).round().max(1.0) as usize
+    }
+}
+
+/// Standard deviations of white sensor noise, and the delay of all sensors. Zero by default: a perfect sensor.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SensorNoise {
+    /// Joint angle, rad.
+    pub joint_position: f64,
+    /// Joint speed, rad/s.
+    pub joint_velocity: f64,
+    /// Angular velocity, rad/s.
+    pub gyro: f64,
+    /// Specific force, m/s^2.
+    pub accelerometer: f64,
+    /// Orientation estimate, rad about each axis.
+    pub orientation: f64,
+    /// Contact force, as a share of the force.
+    pub contact_force: f64,
+    /// Ball position, m on each horizontal axis.
+    pub ball: f64,
+    /// Delay of all readings, s; rounded to whole far steps.
+    pub delay: f64,
+    /// Further delay of the ball's sight, s.
+    pub ball_delay: f64,
+}
+
+impl WorldSettings {
+    /// Checks every field.
+    ///
+    /// # Errors
+    /// Names the first field whose value cannot be.
+    pub fn validate(&self) -> Result<(), SimError> {
+        let check = |field: &str, value: f64, good: bool, expected: &str| {
+            if good && value.is_finite() {
+                return Ok(());
+            }
+            Err(SimError::Setting { field: field.into(), found: value.to_string(), expected: expected.into() })
+        };
+        let positive = |field: &str, value: f64| check(field, value, value > 0.0, "a number above 0");
+        let not_negative = |field: &str, value: f64| check(field, value, value >= 0.0, "a number of at least 0");
+        positive("pitch.friction", self.pitch.friction)?;
+        check("pitch.softness", self.pitch.softness, self.pitch.softness >= 0.004, "at least 0.004 s")?;
+        not_negative("pitch.ball_friction", self.pitch.ball_friction)?;
+        not_negative("pitch.rolling_deceleration", self.pitch.rolling_deceleration)?;
+        positive("ball.mass", self.ball.mass)?;
+        positive("ball.radius", self.ball.radius)?;
+        for (name, law) in [("impact", &self.impact), ("pitch.rebound", &self.pitch.rebound)] {
+            positive(&format!("{name}.contact_time"), law.contact_time)?;
+            let e = law.restitution;
+            check(&format!("{name}.restitution"), e, e > 0.0 && e < 1.0, "a number between 0 and 1")?;
+            not_negative(&format!("{name}.friction"), law.friction)?;
+        }
+        positive("step.far", self.step.far)?;
+        positive("step.near", self.step.near)?;
+        positive("step.near_distance", self.step.near_distance)?;
+        let multiple = self.step.far / self.step.near;
+        let whole = (multiple - multiple.round()).abs() < 1e-6 && (1.0..=10_000.0).contains(&multiple.round());
+        check("step.near", self.step.near, whole, "a whole fraction of step.far")?;
+        let noise = &self.sensors;
+        for (field, value) in [
+            ("joint_position", noise.joint_position),
+            ("joint_velocity", noise.joint_velocity),
+            ("gyro", noise.gyro),
+            ("accelerometer", noise.accelerometer),
+            ("orientation", noise.orientation),
+            ("contact_force", noise.contact_force),
+            ("ball", noise.ball),
+            ("delay", noise.delay),
+            ("ball_delay", noise.ball_delay),
+        ] {
+            not_negative(&format!("sensors.{field}"), value)?;
+        }
+        check("sensors.delay", noise.delay, noise.delay <= 1.0, "at most 1 s")?;
+        check("sensors.ball_delay", noise.ball_delay, noise.ball_delay <= 1.0, "at most 1 s")
+    }
+}

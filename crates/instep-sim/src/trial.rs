@@ -1,0 +1,406 @@
+//! One kick from start to finish: runs a controller in a world, watches the impact, audits it, measures and records.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use instep_motion::phase::Side;
+use instep_robot::control::{Controller, JointCommand, Sensors};
+use instep_robot::{LinkPoint, Robot, RobotData};
+use nalgebra::Vector3;
+use serde::Serialize;
+
+use crate::SimError;
+use crate::audit::Audit;
+use crate::impact::{Impact, ImpactWatch};
+use crate::sensors::{SensorSuite, orientation};
+use crate::settings::{Step, WorldSettings};
+use crate::world::{BallState, Snapshot, World};
+
+/// Tilt of the base link beyond which the robot counts as fallen, rad.
+const FALLEN_TILT: f64 = 1.05;
+/// Height of the base link, as a share of its standing height, below which the robot counts as fallen.
+const FALLEN_HEIGHT: f64 = 0.5;
+/// Load (N) above which a contact point of the support foot is expected not to slip.
+const LOADED: f64 = 20.0;
+/// How long before the impact the audit's re-run starts, s.
+const RERUN_LEAD: f64 = 0.008;
+/// Speed beyond the limit that counts as a violation, as a share of the limit: what one step can overshoot.
+const SPEED_TOLERANCE: f64 = 0.02;
+
+/// What is to be tried.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TrialSettings {
+    /// Constants of the world.
+    pub world: WorldSettings,
+    /// Seed of all noise.
+    pub seed: u64,
+    /// Length of the trial, s.
+    pub duration: f64,
+    /// Period at which the controller is called, s; rounded to whole far steps.
+    pub control_period: f64,
+    /// Robot's position at the start, 7 + n.
+    pub q: Vec<f64>,
+    /// Robot's speed at the start, 6 + n.
+    pub v: Vec<f64>,
+    /// Ball at the start.
+    pub ball: BallState,
+    /// Wanted direction of the ball, rad from world x toward y.
+    pub direction: f64,
+}
+
+/// Peak torque and speed of a joint group, each against its limit.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct GroupPeak {
+    /// Group name.
+    pub group: String,
+    /// Joint with the largest share of its torque limit.
+    pub torque_joint: String,
+    /// Its peak torque, N m.
+    pub torque: f64,
+    /// Its limit, N m.
+    pub torque_limit: f64,
+    /// Joint with the largest share of its speed limit.
+    pub speed_joint: String,
+    /// Its peak speed, rad/s.
+    pub speed: f64,
+    /// Its limit, rad/s.
+    pub speed_limit: f64,
+}
+
+/// A joint that went beyond what its motor can do.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LimitViolation {
+    /// Joint name.
+    pub joint: String,
+    /// "torque" or "speed".
+    pub quantity: &'static str,
+    /// Peak, N m or rad/s.
+    pub peak: f64,
+    /// Limit, N m or rad/s.
+    pub limit: f64,
+    /// When, s.
+    pub time: f64,
+}
+
+/// When a part of the kicking leg was fastest along the wanted direction, around the impact.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SegmentPeak {
+    /// "pelvis", "thigh", "shank", "foot" or "toe".
+    pub segment: &'static str,
+    /// Peak forward speed of its centre of mass, m/s.
+    pub speed: f64,
+    /// When, s.
+    pub time: f64,
+}
+
+/// Samples at every far step; one row of `width` numbers a sample.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Record {
+    /// Times, s.
+    pub times: Vec<f64>,
+    /// Robot positions, 7 + n a row.
+    pub q: Vec<f64>,
+    /// Robot speeds, 6 + n a row.
+    pub v: Vec<f64>,
+    /// Joint torques, n a row, N m.
+    pub torques: Vec<f64>,
+    /// Ground force on each contact point, 3 x points a row, N.
+    pub contact_forces: Vec<f64>,
+    /// Ball.
+    pub ball: Vec<BallState>,
+}
+
+/// What came of a kick.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trial {
+    /// The impact, if the ball was touched.
+    pub impact: Option<Impact>,
+    /// Whether the impact may be believed.
+    pub audit: Audit,
+    /// Signed angle from the wanted to the real direction of the ball, rad.
+    pub direction_error: Option<f64>,
+    /// Ball's angle above the horizontal as it leaves, rad.
+    pub launch_angle: Option<f64>,
+    /// When the robot fell, s.
+    pub fell_at: Option<f64>,
+    /// Longest way that a loaded contact point of the support foot slid, m; `None` without an impact.
+    pub support_slip: Option<f64>,
+    /// Peaks by joint group.
+    pub groups: Vec<GroupPeak>,
+    /// Joints beyond their limits.
+    pub limit_violations: Vec<LimitViolation>,
+    /// Peak speeds of the kicking leg from pelvis to toe; empty without an impact.
+    pub segments: Vec<SegmentPeak>,
+    /// Where the ball was at the end, m.
+    pub ball_end: [f64; 3],
+    /// Everything, sampled.
+    pub record: Record,
+}
+
+impl Trial {
+    /// Whether the robot stood to the end.
+    #[must_use]
+    pub fn upright(&self) -> bool {
+        self.fell_at.is_none()
+    }
+}
+
+/// Runs `controller` through one kick.
+///
+/// # Errors
+/// When the settings cannot be, or the simulation diverges. A missed ball, a fall and an invalid impact are results.
+pub fn run(robot: &Arc<Robot>, settings: &TrialSettings, controller: &mut dyn Controller) -> Result<Trial, SimError> {
+    let mut world = World::new(Arc::clone(robot), &settings.world)?;
+    run_in(&mut world, settings, controller)
+}
+
+/// As [`run`], in a world that was already built for the same robot and `settings.world`.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_in(world: &mut World, settings: &TrialSettings, controller: &mut dyn Controller) -> Result<Trial, SimError> {
+    let robot = Arc::clone(world.robot());
+    let far = settings.world.step.far;
+    let whole = |time: f64| (time / far).round().max(1.0) as usize;
+    let (steps, period) = (whole(settings.duration), whole(settings.control_period));
+
+    world.reset(&settings.q, &settings.v, &settings.ball)?;
+    let mut suite = SensorSuite::new(world, settings.seed);
+    suite.sense(world);
+    let mut sensors = Sensors::default();
+    let mut command = JointCommand::zeros(robot.joints.len());
+    let mut watch = ImpactWatch::new();
+    let mut log = RerunLog::new();
+    let mut fall = FallWatch::new(&robot);
+    let mut record = Record::default();
+    record.push(world);
+    for step in 0..steps {
+        if step % period == 0 {
+            suite.read_into(world.time(), &mut sensors);
+            controller.tick(&sensors, &mut command);
+        }
+        log.note(world, &command, &watch);
+        world.advance(&command, Some(&mut watch))?;
+        suite.sense(world);
+        fall.look(world);
+        record.push(world);
+    }
+
+    let ball_end = world.ball().position;
+    let finished = watch.is_over(world.time());
+    let peaks = world.peaks().to_vec();
+    let mut data = robot.data();
+    let impact = watch.impact(&robot, &settings.world.ball, &mut data);
+    let rerun = if impact.is_some() { log.rerun(world, &mut data)? } else { None };
+    let audit = Audit::new(impact.as_ref(), rerun.as_ref(), finished);
+    let velocity = impact.as_ref().map(|impact| Vector3::from(impact.ball_velocity));
+    let kicker = impact.as_ref().and_then(|impact| kicking_side(&robot, &impact.link));
+    let around = impact.as_ref().zip(kicker);
+    Ok(Trial {
+        direction_error: velocity.map(|v| wrap(v.y.atan2(v.x) - settings.direction)),
+        launch_angle: velocity.map(|v| v.z.atan2(v.x.hypot(v.y))),
+        fell_at: fall.fell_at,
+        support_slip: around.map(|(_, side)| record.slip(&robot, side.other(), &mut data)),
+        groups: group_peaks(&robot, &peaks),
+        limit_violations: violations(&robot, &peaks),
+        segments: around.map_or_else(Vec::new, |(impact, side)| {
+            record.segment_peaks(&robot, side, impact.time, settings.direction, &mut data)
+        }),
+        impact,
+        audit,
+        ball_end,
+        record,
+    })
+}
+
+/// Angle in (-pi, pi].
+fn wrap(angle: f64) -> f64 {
+    angle.sin().atan2(angle.cos())
+}
+
+/// The leg that a link belongs to.
+fn kicking_side(robot: &Robot, link: &str) -> Option<Side> {
+    [Side::Left, Side::Right].into_iter().find(|&side| {
+        let leg = robot.leg(side);
+        leg.strike.iter().any(|&geom| {
+            let body = usize::try_from(robot.model().geom_bodyid()[geom]).unwrap_or(0);
+            robot.link_name(body) == link
+        })
+    })
+}
+
+/// The last commands and states before and during the impact, for the re-run.
+struct RerunLog {
+    entries: VecDeque<(Snapshot, f64, JointCommand)>,
+}
+
+impl RerunLog {
+    fn new() -> Self {
+        Self { entries: VecDeque::new() }
+    }
+
+    fn note(&mut self, world: &World, command: &JointCommand, watch: &ImpactWatch) {
+        if watch.is_over(world.time()) {
+            return;
+        }
+        self.entries.push_back((world.snapshot(), world.time(), command.clone()));
+        if watch.started().is_none() {
+            while self.entries.get(1).is_some_and(|(_, time, _)| *time <= world.time() - RERUN_LEAD) {
+                self.entries.pop_front();
+            }
+        }
+    }
+
+    /// Runs the logged commands again from the oldest state at a tenth of the near step.
+    fn rerun(&self, world: &mut World, data: &mut RobotData) -> Result<Option<Impact>, SimError> {
+        let Some((start, _, _)) = self.entries.front() else { return Ok(None) };
+        let settings = *world.settings();
+        let fine = Step { near: settings.step.near / 10.0, near_distance: 10.0, ..settings.step };
+        world.restore(start)?;
+        world.set_step(fine);
+        let mut watch = ImpactWatch::new();
+        let result = self.entries.iter().try_for_each(|(_, _, command)| world.advance(command, Some(&mut watch)));
+        world.set_step(settings.step);
+        result?;
+        Ok(watch.impact(world.robot(), &settings.ball, data))
+    }
+}
+
+/// Watches for a fall: the body on the ground, the base too low or tilted too far.
+struct FallWatch {
+    lowest: f64,
+    fell_at: Option<f64>,
+}
+
+impl FallWatch {
+    fn new(robot: &Robot) -> Self {
+        Self { lowest: FALLEN_HEIGHT * robot.stand[2], fell_at: None }
+    }
+
+    fn look(&mut self, world: &World) {
+        if self.fell_at.is_some() {
+            return;
+        }
+        let up = orientation(world.q()) * Vector3::z();
+        let tilt = up.z.clamp(-1.0, 1.0).acos();
+        if world.q()[2] < self.lowest || tilt > FALLEN_TILT || world.body_touches_ground() {
+            self.fell_at = Some(world.time());
+        }
+    }
+}
+
+impl Record {
+    fn push(&mut self, world: &World) {
+        self.times.push(world.time());
+        self.q.extend_from_slice(world.q());
+        self.v.extend_from_slice(world.v());
+        self.torques.extend_from_slice(world.torques());
+        let mut forces = vec![Vector3::zeros(); world.robot().contacts.len()];
+        world.contact_forces_into(&mut forces);
+        self.contact_forces.extend(forces.iter().flat_map(|force| [force.x, force.y, force.z]));
+        self.ball.push(world.ball());
+    }
+
+    /// Number of samples.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.times.len()
+    }
+
+    /// Whether there is no sample.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.times.is_empty()
+    }
+
+    /// Row `i` of one of the flat arrays.
+    #[must_use]
+    pub fn row<'a>(&self, values: &'a [f64], i: usize) -> &'a [f64] {
+        let width = values.len() / self.len().max(1);
+        &values[i * width..(i + 1) * width]
+    }
+
+    /// Longest horizontal way of a contact point of the `support` foot while it stayed loaded, m.
+    fn slip(&self, robot: &Robot, support: Side, data: &mut RobotData) -> f64 {
+        let mut since: Vec<Option<Vector3<f64>>> = vec![None; robot.contacts.len()];
+        let mut longest: f64 = 0.0;
+        for i in 0..self.len() {
+            data.set_position(self.row(&self.q, i));
+            let forces = self.row(&self.contact_forces, i);
+            for (c, contact) in robot.contacts.iter().enumerate().filter(|(_, contact)| contact.leg == support) {
+                if forces[3 * c + 2] < LOADED {
+                    since[c] = None;
+                    continue;
+                }
+                let now = data.point(&contact.at);
+                let start = since[c].get_or_insert(now);
+                longest = longest.max((now - *start).xy().norm());
+            }
+        }
+        longest
+    }
+
+    /// Peak forward speeds of pelvis, thigh, shank, foot and toe in the half second before the impact and 0.1 s after.
+    fn segment_peaks(
+        &self,
+        robot: &Robot,
+        side: Side,
+        impact: f64,
+        direction: f64,
+        data: &mut RobotData,
+    ) -> Vec<SegmentPeak> {
+        let leg = robot.leg(side);
+        let forward = Vector3::new(direction.cos(), direction.sin(), 0.0);
+        let mut links = vec![("pelvis", robot.base), ("thigh", leg.thigh), ("shank", leg.shank), ("foot", leg.foot)];
+        links.extend(leg.toe_link.map(|toe| ("toe", toe)));
+        let mut peaks: Vec<SegmentPeak> =
+            links.iter().map(|(segment, _)| SegmentPeak { segment, speed: f64::NEG_INFINITY, time: 0.0 }).collect();
+        for i in (0..self.len()).filter(|&i| (impact - 0.5..=impact + 0.1).contains(&self.times[i])) {
+            data.set_state(self.row(&self.q, i), self.row(&self.v, i));
+            for (peak, (_, link)) in peaks.iter_mut().zip(&links) {
+                let centre = LinkPoint { link: *link, point: robot.model().body_ipos()[*link].into() };
+                let speed = data.point_velocity(&centre).dot(&forward);
+                if speed > peak.speed {
+                    (peak.speed, peak.time) = (speed, self.times[i]);
+                }
+            }
+        }
+        peaks
+    }
+}
+
+fn group_peaks(robot: &Robot, peaks: &[crate::world::JointPeak]) -> Vec<GroupPeak> {
+    let mut groups = Vec::with_capacity(robot.groups.len());
+    for (g, group) in robot.groups.iter().enumerate() {
+        let members = || robot.joints.iter().zip(peaks).filter(|(joint, _)| joint.group == g);
+        let torque = members().max_by(|a, b| (a.1.torque / a.0.torque).total_cmp(&(b.1.torque / b.0.torque)));
+        let speed = members().max_by(|a, b| (a.1.speed / a.0.speed).total_cmp(&(b.1.speed / b.0.speed)));
+        let Some(((torque_joint, torque), (speed_joint, speed))) = torque.zip(speed) else { continue };
+        groups.push(GroupPeak {
+            group: group.clone(),
+            torque_joint: torque_joint.name.clone(),
+            torque: torque.torque,
+            torque_limit: torque_joint.torque,
+            speed_joint: speed_joint.name.clone(),
+            speed: speed.speed,
+            speed_limit: speed_joint.speed,
+        });
+    }
+    groups
+}
+
+fn violations(robot: &Robot, peaks: &[crate::world::JointPeak]) -> Vec<LimitViolation> {
+    let mut found = Vec::new();
+    for (joint, peak) in robot.joints.iter().zip(peaks) {
+        let mut add = |quantity, peak, limit, time| {
+            found.push(LimitViolation { joint: joint.name.clone(), quantity, peak, limit, time });
+        };
+        if peak.torque > joint.torque * (1.0 + 1e-9) {
+            add("torque", peak.torque, joint.torque, peak.torque_time);
+        }
+        if peak.speed > joint.speed * (1.0 + SPEED_TOLERANCE) {
+            add("speed", peak.speed, joint.speed, peak.speed_time);
+        }
+    }
+    found
+}

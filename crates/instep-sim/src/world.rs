@@ -1,0 +1,537 @@
+//! Robot, pitch and ball in one MuJoCo model, stepped under the robot's real limits.
+//!
+//! All contacts are explicit pairs: soles and body with the ground, striking geoms with the ball, the ball with the
+//! ground, and the robot's own self-collision pairs; nothing else touches. Drives are computed here at every physics
+//! step from the command and the state, so that no controller can ask for more torque or speed than the motors have.
+//! The far step is also the period at which commands are taken; while the ball is near a striking geom it is divided
+//! into near steps (facts/mujoco-from-rust.md, section 5).
+
+use std::sync::Arc;
+
+use instep_robot::Robot;
+use instep_robot::control::{JointCommand, drive_torque};
+use mujoco_rs::error::MjEditError;
+use mujoco_rs::mujoco_c::mjtCone;
+use mujoco_rs::prelude::*;
+use mujoco_rs::wrappers::mj_editing::{MjSpec, SpecItem};
+use nalgebra::{Matrix3, Vector3};
+
+use crate::SimError;
+use crate::contact_law::{SOLIMP, solref};
+use crate::impact::ImpactWatch;
+use crate::settings::WorldSettings;
+
+const FLOOR: &str = "instep_floor";
+const BALL: &str = "instep_ball";
+
+/// Where the ball is and how it moves, world frame, SI units.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BallState {
+    /// Centre, m.
+    pub position: [f64; 3],
+    /// `world_from_ball`, w, x, y, z.
+    pub orientation: [f64; 4],
+    /// Velocity of the centre, m/s.
+    pub velocity: [f64; 3],
+    /// Angular velocity in the ball's frame, rad/s.
+    pub angular_velocity: [f64; 3],
+}
+
+impl BallState {
+    /// A ball at rest with its centre at `position` (m).
+    #[must_use]
+    pub fn at_rest(position: [f64; 3]) -> Self {
+        Self { position, orientation: [1.0, 0.0, 0.0, 0.0], velocity: [0.0; 3], angular_velocity: [0.0; 3] }
+    }
+}
+
+/// The greatest torque and speed that a joint has had since the last reset, with their times.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct JointPeak {
+    /// N m, absolute.
+    pub torque: f64,
+    /// s.
+    pub torque_time: f64,
+    /// rad/s, absolute.
+    pub speed: f64,
+    /// s.
+    pub speed_time: f64,
+}
+
+/// All that is needed to go on from an instant.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Snapshot {
+    state: Vec<f64>,
+    time: f64,
+    work: f64,
+}
+
+/// Robot, pitch and ball.
+pub struct World {
+    robot: Arc<Robot>,
+    settings: WorldSettings,
+    data: MjData<Box<MjModel>>,
+    ball_geom: usize,
+    floor_geom: usize,
+    /// Striking geoms as (geom, bounding radius).
+    strike: Vec<(usize, f64)>,
+    /// For each geom of the world: the contact point that it is, if any.
+    contact_of_geom: Vec<Option<usize>>,
+    /// For each geom of the world: whether it belongs to the robot's body above the feet.
+    is_body: Vec<bool>,
+    peaks: Vec<JointPeak>,
+    time: f64,
+    work: f64,
+    near: bool,
+}
+
+impl std::fmt::Debug for World {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("World").field("robot", &self.robot.name).field("time", &self.time).finish_non_exhaustive()
+    }
+}
+
+impl World {
+    /// Builds a world around `robot`: the robot in its standing pose at the origin, the ball at rest 1 m ahead.
+    ///
+    /// # Errors
+    /// When a setting cannot be, or MuJoCo refuses the world.
+    pub fn new(robot: Arc<Robot>, settings: &WorldSettings) -> Result<Self, SimError> {
+        settings.validate()?;
+        let name = robot.name.clone();
+        let refused = |detail: String| SimError::World { robot: name.clone(), detail };
+        let mut spec = robot.spec()?;
+        build(&mut spec, &robot, settings).map_err(|e| refused(e.to_string()))?;
+        let model = spec.compile().map_err(|e| refused(e.to_string()))?;
+
+        let geom = |name: &str| model.name_to_id(MjtObjBase::mjOBJ_GEOM, name);
+        let (Some(ball_geom), Some(floor_geom)) = (geom(BALL), geom(FLOOR)) else {
+            return Err(refused("ball or floor were lost in compilation".into()));
+        };
+        let world_geom = |robot_geom: usize| {
+            robot
+                .model()
+                .id_to_name(MjtObjBase::mjOBJ_GEOM, robot_geom)
+                .and_then(geom)
+                .ok_or_else(|| refused(format!("geom {robot_geom} was lost in compilation")))
+        };
+        let mut strike = Vec::new();
+        for &robot_geom in robot.legs.iter().flat_map(|leg| &leg.strike) {
+            let id = world_geom(robot_geom)?;
+            strike.push((id, model.geom_rbound()[id]));
+        }
+        let geoms = model.geom_bodyid().len();
+        let mut contact_of_geom = vec![None; geoms];
+        for (i, contact) in robot.contacts.iter().enumerate() {
+            contact_of_geom[world_geom(contact.geom)?] = Some(i);
+        }
+        let feet = foot_links(&robot);
+        let bodies = robot.model().body_parentid().len();
+        let is_body = model
+            .geom_bodyid()
+            .iter()
+            .map(|&body| {
+                let body = usize::try_from(body).unwrap_or(0);
+                (1..bodies).contains(&body) && !feet.contains(&body)
+            })
+            .collect();
+        let joints = robot.joints.len();
+        let mut world = Self {
+            robot,
+            settings: *settings,
+            data: MjData::try_new(Box::new(model)).map_err(|e| refused(e.to_string()))?,
+            ball_geom,
+            floor_geom,
+            strike,
+            contact_of_geom,
+            is_body,
+            peaks: vec![JointPeak::default(); joints],
+            time: 0.0,
+            work: 0.0,
+            near: false,
+        };
+        let stand = world.robot.stand.clone();
+        let still = vec![0.0; world.robot.nv()];
+        world.reset(&stand, &still, &BallState::at_rest([1.0, 0.0, settings.ball.radius]))?;
+        Ok(world)
+    }
+
+    /// Starts again from a state of the robot (q: 7 + n, v: 6 + n, see instep-robot) and of the ball.
+    ///
+    /// # Errors
+    /// When a vector has another length or holds something that is not finite.
+    pub fn reset(&mut self, q: &[f64], v: &[f64], ball: &BallState) -> Result<(), SimError> {
+        let (nq, nv) = (self.robot.nq(), self.robot.nv());
+        let wrong = |found: String, expected: String| Err(SimError::State { found, expected });
+        if q.len() != nq || v.len() != nv {
+            let found = format!("{} positions and {} speeds", q.len(), v.len());
+            return wrong(found, format!("{nq} and {nv} for {}", self.robot.name));
+        }
+        let ball_numbers = ball.position.iter().chain(&ball.orientation).chain(&ball.velocity);
+        if let Some(bad) = q.iter().chain(v).chain(ball_numbers).find(|x| !x.is_finite()) {
+            return wrong(bad.to_string(), "finite numbers".into());
+        }
+        self.data.reset();
+        let qpos = self.data.qpos_mut();
+        qpos[..nq].copy_from_slice(q);
+        qpos[nq..nq + 3].copy_from_slice(&ball.position);
+        qpos[nq + 3..nq + 7].copy_from_slice(&ball.orientation);
+        let qvel = self.data.qvel_mut();
+        qvel[..nv].copy_from_slice(v);
+        qvel[nv..nv + 3].copy_from_slice(&ball.velocity);
+        qvel[nv + 3..nv + 6].copy_from_slice(&ball.angular_velocity);
+        self.data.forward();
+        self.peaks.fill(JointPeak::default());
+        self.time = 0.0;
+        self.work = 0.0;
+        self.near = self.is_near();
+        Ok(())
+    }
+
+    /// Advances one far step under `command`, in near steps while the ball is near; tells `watch` of every near step.
+    ///
+    /// # Errors
+    /// When the command or the state is no longer finite.
+    pub fn advance(&mut self, command: &JointCommand, mut watch: Option<&mut ImpactWatch>) -> Result<(), SimError> {
+        self.near = self.is_near();
+        if !self.near {
+            self.step(command, self.settings.step.far)?;
+            return Ok(());
+        }
+        for _ in 0..self.settings.step.near_per_far() {
+            if let Some(watch) = watch.as_deref_mut() {
+                watch.before(self);
+            }
+            self.step(command, self.settings.step.near)?;
+            if let Some(watch) = watch.as_deref_mut() {
+                watch.after(self);
+            }
+        }
+        Ok(())
+    }
+
+    /// One physics step of `dt` (s).
+    fn step(&mut self, command: &JointCommand, dt: f64) -> Result<(), SimError> {
+        let joints = &self.robot.joints;
+        let mut torque_sum = 0.0;
+        for (i, joint) in joints.iter().enumerate() {
+            let (q, v) = (self.data.qpos()[7 + i], self.data.qvel()[6 + i]);
+            let torque = drive_torque(joint, command.positions[i], command.velocities[i], command.torques[i], q, v);
+            torque_sum += torque;
+            self.work += 0.5 * dt * torque * v;
+            self.data.qfrc_applied_mut()[6 + i] = torque;
+            let peak = &mut self.peaks[i];
+            if torque.abs() > peak.torque {
+                (peak.torque, peak.torque_time) = (torque.abs(), self.time);
+            }
+            if v.abs() > peak.speed {
+                (peak.speed, peak.speed_time) = (v.abs(), self.time);
+            }
+        }
+        if !torque_sum.is_finite() {
+            return Err(SimError::Diverged { time: self.time, what: "a joint torque" });
+        }
+        self.data.model_opt_mut().timestep = dt;
+        self.data.step();
+        self.time += dt;
+        // Work by the mean of the speeds before and after the step.
+        let mut speed_sum = 0.0;
+        for i in 6..6 + joints.len() {
+            let v = self.data.qvel()[i];
+            speed_sum += v;
+            self.work += 0.5 * dt * self.data.qfrc_applied()[i] * v;
+        }
+        if !(speed_sum + self.data.qpos()[2]).is_finite() {
+            return Err(SimError::Diverged { time: self.time, what: "a joint speed" });
+        }
+        Ok(())
+    }
+
+    /// Whether the gap between the ball and a striking geom is under the near distance.
+    fn is_near(&mut self) -> bool {
+        let reach = self.settings.step.near_distance;
+        let ball = Vector3::from(self.data.geom_xpos()[self.ball_geom]);
+        let radius = self.settings.ball.radius;
+        (0..self.strike.len()).any(|i| {
+            let (geom, bound) = self.strike[i];
+            let centre = Vector3::from(self.data.geom_xpos()[geom]);
+            (ball - centre).norm() < reach + radius + bound
+                && self.data.geom_distance(geom, self.ball_geom, 2.0 * reach, None) < reach
+        })
+    }
+
+    /// The robot.
+    #[must_use]
+    pub fn robot(&self) -> &Arc<Robot> {
+        &self.robot
+    }
+
+    /// The constants.
+    #[must_use]
+    pub fn settings(&self) -> &WorldSettings {
+        &self.settings
+    }
+
+    /// Since the last reset, s.
+    #[must_use]
+    pub fn time(&self) -> f64 {
+        self.time
+    }
+
+    /// Work that the motors have done since the last reset, J.
+    #[must_use]
+    pub fn motor_work(&self) -> f64 {
+        self.work
+    }
+
+    /// The robot's position, 7 + n.
+    #[must_use]
+    pub fn q(&self) -> &[f64] {
+        &self.data.qpos()[..self.robot.nq()]
+    }
+
+    /// The robot's speed, 6 + n.
+    #[must_use]
+    pub fn v(&self) -> &[f64] {
+        &self.data.qvel()[..self.robot.nv()]
+    }
+
+    /// The torques of the last step, N m.
+    #[must_use]
+    pub fn torques(&self) -> &[f64] {
+        &self.data.qfrc_applied()[6..self.robot.nv()]
+    }
+
+    /// The ball.
+    #[must_use]
+    pub fn ball(&self) -> BallState {
+        let q = &self.data.qpos()[self.robot.nq()..];
+        let v = &self.data.qvel()[self.robot.nv()..];
+        BallState {
+            position: [q[0], q[1], q[2]],
+            orientation: [q[3], q[4], q[5], q[6]],
+            velocity: [v[0], v[1], v[2]],
+            angular_velocity: [v[3], v[4], v[5]],
+        }
+    }
+
+    /// Each joint's peaks since the last reset.
+    #[must_use]
+    pub fn peaks(&self) -> &[JointPeak] {
+        &self.peaks
+    }
+
+    /// Whether the last step was a near one.
+    #[must_use]
+    pub fn is_near_step(&self) -> bool {
+        self.near
+    }
+
+    /// Force of the ground on each contact point in the world, N, as of the last step; `forces` has one entry a point.
+    pub fn contact_forces_into(&self, forces: &mut [Vector3<f64>]) {
+        forces.fill(Vector3::zeros());
+        for (i, contact) in self.data.contact().iter().enumerate() {
+            let [a, b] = contact.geom.map(|geom| usize::try_from(geom).unwrap_or(usize::MAX));
+            let (point, sign) = match (a == self.floor_geom, b == self.floor_geom) {
+                (true, false) => (b, 1.0),
+                (false, true) => (a, -1.0),
+                _ => continue,
+            };
+            if let Some(index) = self.contact_of_geom.get(point).copied().flatten() {
+                forces[index] += contact_force(&self.data, i) * sign;
+            }
+        }
+    }
+
+    /// Whether a part of the robot other than its feet touches the ground.
+    #[must_use]
+    pub fn body_touches_ground(&self) -> bool {
+        self.data.contact().iter().any(|contact| {
+            let [a, b] = contact.geom.map(|geom| usize::try_from(geom).unwrap_or(usize::MAX));
+            let other = if a == self.floor_geom {
+                b
+            } else if b == self.floor_geom {
+                a
+            } else {
+                return false;
+            };
+            contact.dist < 0.0 && self.is_body.get(other).copied().unwrap_or(false)
+        })
+    }
+
+    /// Origin of a link (m) and `world_from_link`, as of the start of the last step.
+    pub(crate) fn link_pose(&self, link: usize) -> (Vector3<f64>, Matrix3<f64>) {
+        (self.data.xpos()[link].into(), Matrix3::from_row_slice(&self.data.xmat()[link]))
+    }
+
+    /// Every contact of the ball with the robot in the last step: body index of the link, point (m) and force on the
+    /// ball (N) in the world.
+    pub(crate) fn ball_strikes(&self) -> impl Iterator<Item = (usize, Vector3<f64>, Vector3<f64>)> {
+        self.data.contact().iter().enumerate().filter_map(|(i, contact)| {
+            let [a, b] = contact.geom.map(|geom| usize::try_from(geom).unwrap_or(usize::MAX));
+            if a == self.floor_geom || b == self.floor_geom {
+                return None;
+            }
+            let (striker, sign) = match (a == self.ball_geom, b == self.ball_geom) {
+                (false, true) => (a, 1.0),
+                (true, false) => (b, -1.0),
+                _ => return None,
+            };
+            let link = usize::try_from(self.data.model().geom_bodyid()[striker]).ok()?;
+            Some((link, Vector3::from(contact.pos), contact_force(&self.data, i) * sign))
+        })
+    }
+
+    /// The present state, to come back to.
+    #[must_use]
+    pub fn snapshot(&self) -> Snapshot {
+        Snapshot {
+            state: self.data.state(MjtState::mjSTATE_INTEGRATION as u32).into_vec(),
+            time: self.time,
+            work: self.work,
+        }
+    }
+
+    /// Goes back to `snapshot`, which a world of the same robot and settings has made.
+    ///
+    /// # Errors
+    /// When the snapshot is of another world.
+    pub fn restore(&mut self, snapshot: &Snapshot) -> Result<(), SimError> {
+        self.data
+            .set_state(&snapshot.state, MjtState::mjSTATE_INTEGRATION as u32)
+            .map_err(|e| SimError::State { found: e.to_string(), expected: "a snapshot of this world".into() })?;
+        self.data.forward();
+        self.time = snapshot.time;
+        self.work = snapshot.work;
+        Ok(())
+    }
+
+    /// Changes the time steps; for a re-run in finer ones.
+    pub(crate) fn set_step(&mut self, step: crate::settings::Step) {
+        self.settings.step = step;
+    }
+
+    /// The bare MuJoCo data, for the benchmark that compares with a plain `mj_step` loop.
+    pub fn mujoco(&mut self) -> &mut MjData<Box<MjModel>> {
+        &mut self.data
+    }
+}
+
+/// Force that geom 1 puts on geom 2 at contact `i`, world frame, N.
+fn contact_force(data: &MjData<Box<MjModel>>, i: usize) -> Vector3<f64> {
+    let Ok(local) = data.try_contact_force(i) else { return Vector3::zeros() };
+    let frame = &data.contact()[i].frame;
+    let axis = |k: usize| Vector3::new(frame[3 * k], frame[3 * k + 1], frame[3 * k + 2]);
+    axis(0) * local[0] + axis(1) * local[1] + axis(2) * local[2]
+}
+
+/// Body indices of the links that carry contact points.
+fn foot_links(robot: &Robot) -> Vec<usize> {
+    let mut links: Vec<usize> = robot.contacts.iter().map(|contact| contact.at.link).collect();
+    links.extend(robot.legs.iter().map(|leg| leg.foot));
+    links.sort_unstable();
+    links.dedup();
+    links
+}
+
+/// Adds ground, ball and all contact pairs to the robot's specification and sets the solver.
+fn build(spec: &mut MjSpec, robot: &Robot, settings: &WorldSettings) -> Result<(), MjEditError> {
+    // Contacts are explicit pairs, and pairs go by name.
+    let mut body_geoms = Vec::new();
+    for (i, geom) in spec.geom_iter_mut().enumerate() {
+        if geom.name().is_empty() {
+            geom.set_name(&format!("instep_geom_{i}"))?;
+        }
+        if geom.contype() != 0 || geom.conaffinity() != 0 {
+            body_geoms.push(geom.name().to_owned());
+        }
+        geom.set_contype(0);
+        geom.set_conaffinity(0);
+    }
+    let feet = foot_links(robot);
+    let geom_name = |geom: usize| robot.model().id_to_name(MjtObjBase::mjOBJ_GEOM, geom).unwrap_or_default().to_owned();
+    let on_foot: Vec<String> = (0..robot.model().geom_bodyid().len())
+        .filter(|&geom| feet.contains(&usize::try_from(robot.model().geom_bodyid()[geom]).unwrap_or(0)))
+        .map(geom_name)
+        .collect();
+    body_geoms.retain(|name| !on_foot.contains(name));
+
+    let world = spec.world_body_mut();
+    world
+        .add_geom()
+        .with_name(FLOOR)
+        .with_type(MjtGeomBase::mjGEOM_PLANE)
+        .with_size([0.0, 0.0, 1.0])
+        .with_contype(0)
+        .with_conaffinity(0);
+    let ball = world.add_body().with_name(BALL).with_pos([1.0, 0.0, settings.ball.radius]);
+    ball.add_free_joint().set_name(BALL)?;
+    // A thin shell.
+    let inertia = 2.0 / 3.0 * settings.ball.mass * settings.ball.radius * settings.ball.radius;
+    ball.set_mass(settings.ball.mass);
+    *ball.inertia_mut() = [inertia; 3];
+    // Left unset, the specification takes the body's own place for its centre of mass.
+    *ball.ipos_mut() = [0.0; 3];
+    ball.set_explicitinertial(true);
+    ball.add_geom()
+        .with_name(BALL)
+        .with_type(MjtGeomBase::mjGEOM_SPHERE)
+        .with_size([settings.ball.radius, 0.0, 0.0])
+        .with_mass(0.0)
+        .with_contype(0)
+        .with_conaffinity(0);
+
+    let sole = [settings.pitch.softness, 1.0];
+    let slide = settings.pitch.friction;
+    for contact in &robot.contacts {
+        add_pair(spec, FLOOR, &contact.name, 3, [slide, slide, 0.0, 0.0, 0.0], sole, None);
+    }
+    for name in &body_geoms {
+        add_pair(spec, FLOOR, name, 3, [slide, slide, 0.0, 0.0, 0.0], sole, None);
+    }
+    for pair in &robot.self_collision {
+        let [a, b] = pair.map(geom_name);
+        add_pair(spec, &a, &b, 1, [0.1, 0.1, 0.0, 0.0, 0.0], sole, None);
+    }
+    for &geom in robot.legs.iter().flat_map(|leg| &leg.strike) {
+        let grip = settings.impact.friction;
+        let friction = [grip, grip, 0.0, 0.0, 0.0];
+        add_pair(spec, &geom_name(geom), BALL, 3, friction, solref(&settings.impact), Some(SOLIMP));
+    }
+    // Rolling of a thin shell: (m + I / r^2) a = N c / r with I = 2/3 m r^2, so c = 5/3 r a / g.
+    let roll = 5.0 / 3.0 * settings.ball.radius * settings.pitch.rolling_deceleration / 9.81;
+    let grip = settings.pitch.ball_friction;
+    let friction = [grip, grip, 0.005, roll, roll];
+    add_pair(spec, FLOOR, BALL, 6, friction, solref(&settings.pitch.rebound), Some(SOLIMP));
+
+    let option = spec.option_mut();
+    option.timestep = settings.step.far;
+    option.integrator = MjtIntegrator::mjINT_IMPLICITFAST as i32;
+    option.cone = mjtCone::mjCONE_ELLIPTIC as i32;
+    option.impratio = 10.0;
+    option.iterations = 20;
+    option.ls_iterations = 20;
+    option.gravity = [0.0, 0.0, -9.81];
+    Ok(())
+}
+
+/// Adds one contact pair.
+fn add_pair(
+    spec: &mut MjSpec,
+    first: &str,
+    second: &str,
+    dimensions: i32,
+    friction: [f64; 5],
+    solref: [f64; 2],
+    solimp: Option<[f64; 5]>,
+) {
+    let pair = spec.add_pair();
+    pair.with_geomname1(first)
+        .with_geomname2(second)
+        .with_condim(dimensions)
+        .with_friction(friction)
+        .with_solref(solref);
+    if let Some(solimp) = solimp {
+        pair.with_solimp(solimp);
+    }
+}

@@ -1,0 +1,77 @@
+//! Torque and speed limits live in the world, whatever a controller asks for.
+
+use instep_robot::control::{Controller, JointCommand, Sensors};
+use instep_sim::settings::WorldSettings;
+use instep_sim::trial::{TrialSettings, run};
+use instep_sim::{BallState, World};
+
+use crate::robot;
+
+/// Asks for far more than any motor has.
+struct Greedy;
+
+impl Controller for Greedy {
+    fn tick(&mut self, sensors: &Sensors, command: &mut JointCommand) {
+        let sign = if (sensors.time * 5.0) as i64 % 2 == 0 { 1.0 } else { -1.0 };
+        command.torques.fill(sign * 1e5);
+    }
+}
+
+#[test]
+fn a_greedy_controller_gets_no_more_than_the_motors_have() {
+    let robot = robot("prestoe");
+    let mut q = robot.stand.clone();
+    q[2] += 2.0;
+    let settings = TrialSettings {
+        world: WorldSettings::default(),
+        seed: 1,
+        duration: 0.6,
+        control_period: 0.002,
+        v: vec![0.0; robot.nv()],
+        q,
+        ball: BallState::at_rest([5.0, 0.0, 0.11]),
+        direction: 0.0,
+    };
+    let trial = run(&robot, &settings, &mut Greedy).unwrap();
+    for group in &trial.groups {
+        assert!(group.torque <= group.torque_limit * (1.0 + 1e-12), "{group:?}");
+    }
+    // No motor pushes on at or beyond its speed limit.
+    let record = &trial.record;
+    let mut fast = 0;
+    for i in 1..record.len() {
+        let (before, torques) = (record.row(&record.v, i - 1), record.row(&record.torques, i));
+        for (j, joint) in robot.joints.iter().enumerate() {
+            if before[6 + j].abs() >= joint.speed {
+                fast += 1;
+                assert!(torques[j] * before[6 + j] <= 0.0, "{} at {} rad/s", joint.name, before[6 + j]);
+            }
+        }
+    }
+    assert!(fast > 10, "the controller drove joints to their speed limits {fast} times");
+    let torque_violations = trial.limit_violations.iter().filter(|v| v.quantity == "torque").count();
+    assert_eq!(torque_violations, 0, "{:?}", trial.limit_violations);
+    // It did try: the hips reached their torque limit.
+    assert!(trial.groups.iter().any(|g| g.group == "hip" && g.torque > 0.99 * g.torque_limit));
+}
+
+#[test]
+fn a_standing_robot_stands_and_its_weight_is_on_its_soles() {
+    for name in ["prestoe"] {
+        let robot = robot(name);
+        let mut world = World::new(robot.clone(), &WorldSettings::default()).unwrap();
+        let mut command = JointCommand::zeros(robot.joints.len());
+        command.positions.copy_from_slice(&robot.stand[7..]);
+        let mut forces = vec![nalgebra::Vector3::zeros(); robot.contacts.len()];
+        let mut mean = 0.0;
+        for step in 0..1500 {
+            world.advance(&command, None).unwrap();
+            if step >= 1000 {
+                world.contact_forces_into(&mut forces);
+                mean += forces.iter().map(|f| f.z).sum::<f64>() / 500.0;
+            }
+        }
+        assert!(world.q()[2] > 0.9 * robot.stand[2], "{name} has fallen to {} m", world.q()[2]);
+        assert!((mean / (9.81 * robot.mass()) - 1.0).abs() < 0.01, "{name} carries {mean} N");
+    }
+}

@@ -1,0 +1,19 @@
+//! Integration tests of the world, one binary.
+
+#[path = "../rig/mod.rs"]
+mod rig;
+
+mod ball;
+mod determinism;
+mod limits;
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use instep_robot::Robot;
+
+/// A robot of the repository.
+fn robot(name: &str) -> Arc<Robot> {
+    let folder: PathBuf = [env!("CARGO_MANIFEST_DIR"), "..", "..", "robots", name].iter().collect();
+    Arc::new(Robot::load(&folder).unwrap())
+}
