@@ -206,13 +206,13 @@ fn stretches(contact: &[bool], value: bool) -> Vec<Stance> {
 impl Default for ContactSettings {
     fn default() -> Self {
         Self {
-            height_on: 0.03,
-            height_off: 0.05,
-            speed_on: 0.4,
-            speed_off: 0.8,
+            height_on: 0.05,
+            height_off: 0.07,
+            speed_on: 0.5,
+            speed_off: 1.0,
             min_contact: 0.05,
             min_gap: 0.04,
-            smoothing: 0.04,
+            smoothing: 0.02,
         }
     }
 }

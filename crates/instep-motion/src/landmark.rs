@@ -5,9 +5,10 @@
 //! [`Segment`]. Conventions are tried as a whole, since "LeftHip" is a joint in one and a hip bone in another.
 //!
 //! The heel and the sole are derived, no file has them: the sole is a plane [`SOLE_DEPTH`] below the ball of the foot,
-//! and the heel lies [`HEEL_FRACTION`] of the distance from ankle to toe tip behind the ankle. The plane's slope
-//! relative to the foot bone is that of the zero pose (feet flat, true of T-poses and roughly of CMU's skeletons)
-//! until [`Landmarks::calibrated`] takes it from a clip in which the feet stand.
+//! and the heel lies [`HEEL_FRACTION`] of the distance from ankle to toe tip behind the ankle. Before
+//! [`Landmarks::calibrated`] takes the plane's slope from a clip in which the feet stand, it comes from the zero pose:
+//! level along the toes, and sideways at a right angle to the shank. So it suits a T-pose as well as CMU's zero pose,
+//! whose legs are spread by 20 degrees and whose feet are tilted with them.
 
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -351,7 +352,8 @@ impl Landmarks {
             both(&|side| tip(names.finger(skeleton, side).unwrap_or_else(|| bones[Segment::Hand(side).slot()])));
         let soles = [Side::Left, Side::Right].map(|side| {
             let [foot, toes] = [Segment::Foot(side), Segment::Toes(side)].map(|segment| bones[segment.slot()]);
-            Sole::new(&zero, [foot, toes], &toe_tips[slot(side)], Vector3::z())
+            let up = zero_pose_normal(&zero, [bones[Segment::Shank(side).slot()], foot, toes], &toe_tips[slot(side)]);
+            Sole::new(&zero, [foot, toes], &toe_tips[slot(side)], up)
         });
         let head = tip(bones[Segment::Head.slot()]);
         Ok(Self { convention: names.convention, bones, head, toe_tips, hand_tips, soles })
@@ -403,8 +405,8 @@ impl Landmarks {
         SolePoints { heel: sole.heel.at(poses), ball: sole.ball.at(poses), toe_tip: sole.toe_tip.at(poses) }
     }
 
-    /// `world_from_sole`: the foot's rotation as it would be, had the foot stood flat in the zero pose. It turns about z
-    /// only while the foot stands flat. No allocation.
+    /// `world_from_sole`: the foot's rotation as it would be, had the foot stood flat in the zero pose. While the foot
+    /// stands flat, this is a turn about z and nothing else. No allocation.
     #[must_use]
     pub fn sole_rotation(&self, poses: &BonePoses, side: Side) -> UnitQuaternion<f64> {
         self.rotation(poses, Segment::Foot(side)) * self.soles[slot(side)].foot_from_sole
@@ -412,7 +414,7 @@ impl Landmarks {
 
     /// The same landmarks with each sole's slope taken from the frames of `clip` in which that foot stands: its ball
     /// is slower than 0.2 m/s and the ankle is within 1 cm of its lowest decile among these. A foot that stands for
-    /// less than 0.1 s altogether, or by more than 30 degrees off its zero pose, keeps its sole.
+    /// less than 0.1 s altogether, or by more than 25 degrees off its zero pose's normal, keeps its sole.
     ///
     /// # Panics
     ///
@@ -432,7 +434,8 @@ impl Landmarks {
             let flat = |i: &usize| slow[*i] && ankles[*i].z <= low;
             let flat: Vec<Vector3<f64>> = (0..ups.len()).filter(flat).map(|i| ups[i]).collect();
             let up = Vector3::from_fn(|axis, _| median(flat.iter().map(|up| up[axis]).collect()));
-            let up = up.try_normalize(1e-6).filter(|up| up.z > 30.0_f64.to_radians().cos());
+            let expected = self.soles[slot(side)].foot_from_sole * Vector3::z();
+            let up = up.try_normalize(1e-6).filter(|up| up.angle(&expected) < 25.0_f64.to_radians());
             if let (Some(up), true) = (up, flat.len() as f64 >= 0.1 * clip.rate) {
                 let bones = [Segment::Foot(side), Segment::Toes(side)].map(|segment| self.bone(segment));
                 self.soles[slot(side)] = Sole::new(&zero, bones, &self.toe_tips[slot(side)], up);
@@ -457,6 +460,14 @@ impl Landmarks {
         let joint = self.position(poses, joint);
         (joint - self.position(poses, from)).angle(&(self.position(poses, to) - joint))
     }
+}
+
+/// The sole's unit normal as the zero pose has it (see the module's text).
+fn zero_pose_normal(zero: &BonePoses, [shank, foot, toes]: [usize; 3], toe_tip: &Point) -> Vector3<f64> {
+    let toes = toe_tip.at(zero) - zero.origins[toes];
+    let forward = Vector3::new(toes.x, toes.y, 0.0).try_normalize(1e-6).unwrap_or_else(Vector3::x);
+    let shank = zero.origins[shank] - zero.origins[foot];
+    (shank - forward * forward.dot(&shank)).try_normalize(1e-6).unwrap_or_else(Vector3::z)
 }
 
 impl Sole {

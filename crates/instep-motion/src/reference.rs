@@ -2,12 +2,15 @@
 //!
 //! World frame: z up, ground at z = 0, x along the aimed direction of the kick, origin on the ground under the
 //! ball's centre. Saved as JSON, one knot a line, so that two references can be compared line by line.
+//!
+//! - [`Reference::load`], [`Reference::save`] and [`Reference::validate`]: the file and what it must hold.
+//! - [`Reference::sample_into`]: the state between the knots.
 
-use std::path::Path;
+mod file;
+mod sample;
+mod validate;
 
 use serde::{Deserialize, Serialize};
-
-use crate::MotionError;
 
 use crate::phase::KickPhases;
 
@@ -100,26 +103,6 @@ impl Reference {
 }
 
 impl Reference {
-    /// Reads and validates a reference.
-    ///
-    /// # Errors
-    ///
-    /// [`MotionError`] with file and line or field.
-    pub fn load(path: &Path) -> Result<Self, MotionError> {
-        let _ = path;
-        unimplemented!("body follows")
-    }
-
-    /// Validates and writes the reference, whole or not at all: to a new file in the same folder, then renamed.
-    ///
-    /// # Errors
-    ///
-    /// [`MotionError`] with file and field.
-    pub fn save(&self, path: &Path) -> Result<(), MotionError> {
-        let _ = path;
-        unimplemented!("body follows")
-    }
-
     /// From the first knot to the last, s.
     #[must_use]
     pub fn duration(&self) -> f64 {
@@ -130,11 +113,5 @@ impl Reference {
     #[must_use]
     pub fn joint_index(&self, name: &str) -> Option<usize> {
         self.joint_names.iter().position(|joint| joint == name)
-    }
-
-    /// The state at the time `t`, s, clamped to the reference. Allocates only while `knot` has not yet the capacity.
-    pub fn sample_into(&self, t: f64, knot: &mut Knot) {
-        let _ = (t, knot);
-        unimplemented!("body follows")
     }
 }
