@@ -1,0 +1,18 @@
+//! Integration tests of instep-robot, one binary.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "helpers of tests may fail a test and print its figures"
+)]
+
+mod control;
+mod differences;
+mod geometry;
+mod nao;
+mod oracle;
+mod prestoe;
+mod stands;
+mod support;
+mod wolfgang;
