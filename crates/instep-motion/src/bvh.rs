@@ -143,7 +143,7 @@ fn clip(file: &Path, joints: &[Joint], rows: &[Row], rate: f64, scale: f64) -> R
                 frame.root = place;
             } else if frames.is_empty() {
                 bone.origin = place;
-            } else if !((place - bone.origin).norm() <= STILL) {
+            } else if (place - bone.origin).norm() > STILL {
                 let found = format!("{} moves by {:.4} m against its parent", bone.name, (place - bone.origin).norm());
                 let expected = "position channels that change on the root only, since bones have a fixed length";
                 return Err(MotionError::syntax(file, row.line, found, expected));
@@ -188,5 +188,78 @@ pub(crate) fn unit_missing(path: &Path) -> MotionError {
             let found = format!("not given; the figure is {:.1} units tall in its zero pose", high - low);
             MotionError::content(path, "unit of length", found, expected)
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ARM: &str = "HIERARCHY
+ROOT hip {
+  OFFSET 1 2 3
+  CHANNELS 3 Xrotation Yrotation Zrotation
+  JOINT arm left
+  {
+    OFFSET 0 10 0
+    CHANNELS 6 Zrotation Yrotation Xrotation Xposition Yposition Zposition
+    End Site
+    {
+      OFFSET 0 0 5
+    }
+  }
+}
+MOTION
+Frames: 2
+Frame Time: 0.0333333
+0 0 0  0 0 90  0 20 0
+90 0 0  0 0 90  0 20 0.01
+";
+
+    fn load(text: &str) -> Result<Clip, MotionError> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("arm.bvh");
+        std::fs::write(&path, text).unwrap();
+        load_clip(&path, CENTIMETRE)
+    }
+
+    #[test]
+    fn offsets_channels_and_ends() {
+        let clip = load(ARM).unwrap();
+        assert_eq!(clip.rate, 30.0);
+        let [hip, arm] = &clip.skeleton.bones[..] else { panic!("two bones") };
+        assert_eq!((hip.name.as_str(), arm.name.as_str()), ("hip", "arm left"));
+        // Position channels replace the offset; the file's y is our z. The hip ends where the arm starts.
+        let close = |a: Vector3<f64>, b: [f64; 3]| (a - Vector3::from(b)).norm() < 1e-12;
+        assert!(close(arm.origin, [0.0, 0.0, 0.2]) && close(hip.tip, [0.0, 0.0, 0.2]));
+        assert!(close(arm.tip, [0.05, 0.0, 0.0]));
+        // A root without position channels stays at its offset.
+        assert!(close(clip.frames[1].root, [0.03, 0.01, 0.02]));
+        // Frame 0: the arm turns by 90 degrees about the file's x: its end, along z, goes to -y.
+        let tip = |frame: usize| clip.poses(frame).point(1, &arm.tip);
+        assert!(close(tip(0), [0.03, 0.01, 0.02 + 0.2 - 0.05]));
+        // Frame 1: the hip turns likewise: the arm's start, along y, goes to z; its end then to -z.
+        assert!(close(tip(1), [0.03 + 0.2 - 0.05, 0.01, 0.02]));
+    }
+
+    #[test]
+    fn the_first_channel_is_the_outermost() {
+        let text = ARM.replace("0 0 0  0 0 90", "90 90 0  0 0 0");
+        let clip = load(&text).unwrap();
+        // Rx(90) Ry(90) takes the file's z to x and x to x: our y.
+        let got = clip.frames[0].rotations[0] * Vector3::x();
+        assert!((got - Vector3::y()).norm() < 1e-12, "{got}");
+    }
+
+    #[test]
+    fn joints_that_move_against_their_parent_are_refused() {
+        let error = load(&ARM.replace("0 20 0.01", "0 21 0")).unwrap_err().to_string();
+        assert!(error.contains(":19: arm left moves by 0.0100 m against its parent"), "{error}");
+    }
+
+    #[test]
+    fn rates_that_are_not_whole_are_kept() {
+        let rate = load(&ARM.replace("0.0333333", "0.0417083")).unwrap().rate;
+        assert!((rate - 23.976).abs() < 1e-3, "{rate}");
     }
 }

@@ -65,6 +65,9 @@ pub struct BonePoses {
     pub rotations: Vec<UnitQuaternion<f64>>,
 }
 
+/// How far the norm of a rotation may be from 1.
+const UNIT: f64 = 1e-6;
+
 impl BonePoses {
     /// The point `local` (m, in the frame of bone `bone`) in the world, m.
     ///
@@ -250,8 +253,7 @@ impl Clip {
                 return Err(MotionError::argument(place("root"), format!("{:?}", frame.root.as_slice()), "metres"));
             }
             for (rotation, bone) in frame.rotations.iter().zip(&self.skeleton.bones) {
-                // Written so that NaN fails.
-                if !((rotation.norm() - 1.0).abs() < 1e-6) {
+                if !(1.0 - UNIT..=1.0 + UNIT).contains(&rotation.norm()) {
                     let field = place(&format!("rotations ({})", bone.name));
                     return Err(MotionError::argument(field, format!("norm {}", rotation.norm()), "norm 1"));
                 }
@@ -261,9 +263,10 @@ impl Clip {
     }
 }
 
-/// Slerp the short way; linear where the two are opposite and the way is not defined.
+/// From `a` to `b` the short way round at constant speed. By logarithm and exponential, which keep their accuracy for
+/// small angles, where the usual formula by the arc cosine is off by 1e-8.
 pub(crate) fn slerp(a: &UnitQuaternion<f64>, b: &UnitQuaternion<f64>, s: f64) -> UnitQuaternion<f64> {
-    a.try_slerp(b, s, 1e-9).unwrap_or_else(|| if s < 0.5 { *a } else { *b })
+    a * UnitQuaternion::from_scaled_axis((a.inverse() * b).scaled_axis() * s)
 }
 
 /// How to read a clip whose format leaves something open.

@@ -227,7 +227,15 @@ mod tests {
 
     #[test]
     fn contact_begins_low_and_slow_and_ends_high_or_fast() {
-        let settings = ContactSettings { min_contact: 0.0, min_gap: 0.0, ..ContactSettings::default() };
+        let settings = ContactSettings {
+            height_on: 0.03,
+            height_off: 0.05,
+            speed_on: 0.4,
+            speed_off: 0.8,
+            min_contact: 0.0,
+            min_gap: 0.0,
+            ..ContactSettings::default()
+        };
         let points = [(0.3, 3.0), (0.02, 3.0), (0.02, 0.1), (0.04, 0.6), (0.04, 0.1), (0.02, 0.9), (0.02, 0.6)];
         let got = contacts(&track(&points), 0.0, 100.0, &settings);
         assert_eq!(got, [false, false, true, true, true, false, false]);

@@ -10,12 +10,15 @@
 //! level along the toes, and sideways at a right angle to the shank. So it suits a T-pose as well as CMU's zero pose,
 //! whose legs are spread by 20 degrees and whose feet are tilted with them.
 
+mod names;
+
 use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::MotionError;
 use crate::clip::{BonePoses, Clip, Skeleton};
 use crate::phase::Side;
 use crate::track::{median, path, quantile, speeds};
+use names::{CONVENTIONS, Names, find_bone};
 
 /// How far the sole lies below the joint at the ball of the foot, m.
 pub const SOLE_DEPTH: f64 = 0.02;
@@ -180,83 +183,6 @@ impl Segment {
             Self::Hand(s) => format!("{s} hand"),
         }
     }
-}
-
-/// Bone names of one convention: candidates for each segment, the first that a skeleton has wins. Compared without
-/// case, after dropping a prefix up to a colon ("mixamorig:", "Character1:"). `#` stands for the side.
-struct Names {
-    convention: &'static str,
-    left_right: [&'static str; 2],
-    pelvis: &'static [&'static str],
-    chest: &'static [&'static str],
-    head: &'static [&'static str],
-    /// Thigh, shank, foot, toes, upper arm, forearm, hand.
-    limbs: [&'static [&'static str]; 7],
-    /// The bone whose tip is the finger tip; the hand's own tip where the skeleton has none of them.
-    finger: &'static [&'static str],
-}
-
-const CONVENTIONS: [Names; 3] = [
-    Names {
-        convention: "CMU ASF",
-        left_right: ["l", "r"],
-        pelvis: &["root"],
-        chest: &["thorax"],
-        head: &["head"],
-        limbs: [&["#femur"], &["#tibia"], &["#foot"], &["#toes"], &["#humerus"], &["#radius"], &["#hand"]],
-        finger: &["#fingers"],
-    },
-    Names {
-        convention: "CMU BVH, Mixamo and LAFAN",
-        left_right: ["left", "right"],
-        pelvis: &["hips", "hip", "pelvis"],
-        chest: &["spine3", "spine2", "spine1", "spine", "chest"],
-        head: &["head"],
-        limbs: [&["#upleg"], &["#leg"], &["#foot"], &["#toebase", "#toe"], &["#arm"], &["#forearm"], &["#hand"]],
-        finger: &["#handmiddle4", "#handmiddle3", "#handindex4", "#handindex1", "#fingerbase"],
-    },
-    Names {
-        convention: "BVH with joint names (LeftHip, LeftKnee)",
-        left_right: ["left", "right"],
-        pelvis: &["hips", "pelvis", "root"],
-        chest: &["chest4", "chest3", "chest2", "chest", "upperchest"],
-        head: &["head"],
-        limbs: [&["#hip"], &["#knee"], &["#ankle"], &["#toe"], &["#shoulder"], &["#elbow"], &["#wrist"]],
-        finger: &["#hand", "#finger"],
-    },
-];
-
-impl Names {
-    fn candidates(&self, segment: Segment) -> Vec<String> {
-        let limb = |limb: usize, side: Side| {
-            let word = self.left_right[usize::from(side == Side::Right)];
-            self.limbs[limb].iter().map(|name| name.replace('#', word)).collect()
-        };
-        let plain = |names: &[&str]| names.iter().map(|&name| name.to_owned()).collect();
-        match segment {
-            Segment::Pelvis => plain(self.pelvis),
-            Segment::Chest => plain(self.chest),
-            Segment::Head => plain(self.head),
-            Segment::Thigh(s) => limb(0, s),
-            Segment::Shank(s) => limb(1, s),
-            Segment::Foot(s) => limb(2, s),
-            Segment::Toes(s) => limb(3, s),
-            Segment::UpperArm(s) => limb(4, s),
-            Segment::Forearm(s) => limb(5, s),
-            Segment::Hand(s) => limb(6, s),
-        }
-    }
-
-    fn finger(&self, skeleton: &Skeleton, side: Side) -> Option<usize> {
-        let word = self.left_right[usize::from(side == Side::Right)];
-        let names: Vec<String> = self.finger.iter().map(|name| name.replace('#', word)).collect();
-        find_bone(skeleton, &names)
-    }
-}
-
-fn find_bone(skeleton: &Skeleton, candidates: &[String]) -> Option<usize> {
-    let plain = |name: &str| name.rsplit(':').next().unwrap_or_default().to_ascii_lowercase();
-    candidates.iter().find_map(|wanted| skeleton.bones.iter().position(|bone| plain(&bone.name) == *wanted))
 }
 
 /// A point fixed to a bone.

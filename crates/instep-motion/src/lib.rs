@@ -5,7 +5,7 @@
 //! - [`landmark`]: which bone of a skeleton is the pelvis, a knee, a toe; where those are at each frame.
 //! - [`despike`]: single-frame spikes of a recording taken out.
 //! - [`contact`] and [`phase`]: when each foot stands, which foot kicks, and the kick's phase times.
-//! - [`reference`]: a robot's motion by joint name, with its contacts, forces and phases: what a retargeter
+//! - [`mod@reference`]: a robot's motion by joint name, with its contacts, forces and phases: what a retargeter
 //!   writes, a learner tracks and a kick engine plays.
 //! - [`spline`]: cubic, quintic and two-cubic via-point polynomials.
 //!

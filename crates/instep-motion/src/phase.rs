@@ -5,11 +5,12 @@
 //! - Swing: before the impact the kicking thigh is farthest back at one instant (end of the wind-up); the swing starts
 //!   when it has come forward by a small part of its way to the impact. In a quick kick that is about when the other
 //!   foot lands, and may be a frame or two earlier.
-//! - Lock: the start of the last stretch before the impact in which the ankle keeps its angle. Humans lock late
-//!   (0.03 to 0.1 s before the impact in CMU's clips).
+//! - Lock: the start of the last stretch before the impact in which the ankle keeps its angle, but not before the
+//!   swing starts. Humans lock late (0.03 to 0.1 s before the impact in CMU's clips).
 //!
-//! No ball was tracked, so the impact is an inference. In CMU's clips the ankle loses 15 to 20 per cent of its speed
-//! within one frame, 0.02 to 0.04 s after the ball of the foot is fastest: that may be the true impact.
+//! No ball was tracked, so the impact is an inference; [`strike_time`] and [`kick_direction`] look at it more closely.
+
+mod strike;
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -19,6 +20,8 @@ use crate::clip::{BonePoses, Clip};
 use crate::contact::ContactSchedule;
 use crate::landmark::{Landmark, Landmarks, Segment};
 use crate::track::{path, speeds};
+
+pub use strike::{PeakSpeeds, kick_direction, peak_speeds, strike_time};
 
 /// Left or right.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -88,18 +91,6 @@ pub struct KickSettings {
     pub swing_onset: f64,
     /// How long before the impact the wind-up is looked for, s; 0.2 to 2.
     pub windup: f64,
-}
-
-/// Greatest speeds of the kicking foot around its impact, m/s.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct PeakSpeeds {
-    /// Of the ankle.
-    pub ankle: f64,
-    /// Of the ball of the foot.
-    pub ball: f64,
-    /// Of the toe tip.
-    pub toe_tip: f64,
 }
 
 impl Default for KickSettings {
@@ -195,9 +186,10 @@ pub fn find_kick(
     let plant = plant(clip, landmarks, contacts, kick_foot, impact)?;
     let swing = swing_start(clip, landmarks, kick_foot, impact, settings);
     let t_impact = clip.time(impact);
+    let t_swing = clip.time(swing);
     let locked = clip.time(ankle_lock(clip, landmarks, kick_foot, impact, settings.lock_angle));
-    let t_lock = locked.min(t_impact - settings.min_lock).max(0.0);
-    let t_swing = clip.time(swing).min(t_lock);
+    let t_lock = locked.max(t_swing).min(t_impact - settings.min_lock).max(0.0);
+    let t_swing = t_swing.min(t_lock);
     Ok(KickPhases { kick_foot, t_plant: clip.time(plant), t_swing, t_lock, t_impact })
 }
 
@@ -269,13 +261,15 @@ fn plant(
     }
 }
 
+/// Time before the impact in which the foot is surely under way, s.
+const FINAL_SWING: f64 = 0.05;
+
 /// The frame in which the kicking thigh has started forward.
 fn swing_start(clip: &Clip, landmarks: &Landmarks, side: Side, impact: usize, settings: &KickSettings) -> usize {
     let first = clip.frame_at(clip.time(impact) - settings.windup);
-    // The thigh's angle in the vertical plane of the kick, forward positive. Over the windup, the way that the foot
-    // goes from there to the impact gives the plane.
+    // The thigh's angle, forward positive, in the vertical plane in which the foot comes to the impact.
     let foot = |frame: usize| landmarks.position(&clip.poses(frame), Landmark::Ankle(side));
-    let forward = foot(impact) - foot(first);
+    let forward = foot(impact) - foot(clip.frame_at(clip.time(impact) - FINAL_SWING));
     let forward = Vector3::new(forward.x, forward.y, 0.0).try_normalize(1e-9).unwrap_or_else(Vector3::x);
     let mut poses = BonePoses::default();
     let angles: Vec<f64> = (first..=impact)
@@ -300,53 +294,4 @@ fn ankle_lock(clip: &Clip, landmarks: &Landmarks, side: Side, impact: usize, nea
     };
     let locked = ankle(impact);
     (0..impact).rev().take_while(|frame| ankle(*frame).angle_to(&locked) < near).last().unwrap_or(impact)
-}
-
-/// The greatest speeds of the kicking foot within 0.1 s of the impact, averaged over `smoothing` seconds
-/// ([`SMOOTHING`]), after spikes are dropped.
-///
-/// # Panics
-///
-/// If `clip` has no frame.
-#[must_use]
-pub fn peak_speeds(clip: &Clip, landmarks: &Landmarks, phases: &KickPhases, smoothing: f64) -> PeakSpeeds {
-    let near = clip.frame_at(phases.t_impact - 0.1)..=clip.frame_at(phases.t_impact + 0.1);
-    let peak = |landmark: Landmark| {
-        let path = path(clip, |poses| landmarks.position(poses, landmark));
-        speeds(&path, clip.rate, smoothing)[near.clone()].iter().copied().fold(0.0, f64::max)
-    };
-    let side = phases.kick_foot;
-    PeakSpeeds {
-        ankle: peak(Landmark::Ankle(side)),
-        ball: peak(Landmark::ToeBase(side)),
-        toe_tip: peak(Landmark::ToeTip(side)),
-    }
-}
-
-/// The horizontal direction in which the ball leaves, a unit vector with z = 0 in the clip's world.
-///
-/// Estimated as the way of the instep (midway between ankle and ball of the foot, where the ball is struck) over
-/// about the time of contact, 0.01 s to both sides of the impact. The foot swings on an arc: in CMU's clips its
-/// direction turns by 2 to 4 degrees a frame there, so an impact that is wrong by a frame turns this by as much.
-///
-/// # Errors
-///
-/// [`MotionError::Argument`] if the foot goes less than 5 mm sideways in that time.
-///
-/// # Panics
-///
-/// If `clip` has no frame.
-pub fn kick_direction(clip: &Clip, landmarks: &Landmarks, phases: &KickPhases) -> Result<Vector3<f64>, MotionError> {
-    const CONTACT: f64 = 0.01;
-    let side = phases.kick_foot;
-    let instep = |t: f64| {
-        let mut poses = BonePoses::default();
-        clip.skeleton.poses_into(&clip.interpolated(t), &mut poses);
-        landmarks.position(&poses, Landmark::Ankle(side)) + landmarks.position(&poses, Landmark::ToeBase(side))
-    };
-    let way = (instep(phases.t_impact + CONTACT) - instep(phases.t_impact - CONTACT)) / 2.0;
-    Vector3::new(way.x, way.y, 0.0).try_normalize(0.005).ok_or_else(|| {
-        let found = format!("{:.4} m within {} s of the impact", way.xy().norm(), CONTACT);
-        MotionError::argument(format!("way of the {side} foot"), found, "0.005 m at least")
-    })
 }

@@ -39,15 +39,23 @@ pub(crate) fn last_line(text: &str) -> usize {
     text.lines().count().max(1)
 }
 
-/// A finite number.
+/// The largest number that is believed: so that no product of it with a unit overflows.
+const LARGEST: f64 = 1e12;
+
+/// A number, finite and not absurdly large.
 pub(crate) fn number(file: &Path, line: usize, word: &str) -> Result<f64, MotionError> {
     match word.parse::<f64>() {
-        Ok(value) if value.is_finite() => Ok(value),
-        _ => Err(MotionError::syntax(file, line, format!("{word:?}"), "a finite number")),
+        Ok(value) if value.abs() <= LARGEST => Ok(value),
+        _ => Err(MotionError::syntax(
+            file,
+            line,
+            format!("{word:?}"),
+            format!("a number of at most {LARGEST:e} in size"),
+        )),
     }
 }
 
-/// Exactly three finite numbers.
+/// Exactly three numbers.
 pub(crate) fn triple(file: &Path, line: usize, words: &[&str]) -> Result<Vector3<f64>, MotionError> {
     let [x, y, z] = words else {
         return Err(MotionError::syntax(file, line, format!("{} values", words.len()), "three numbers"));

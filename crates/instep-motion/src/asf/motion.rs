@@ -95,10 +95,6 @@ impl Open {
         }
         if bone == 0 {
             self.frame.root += z_up(shift) * rig.metres;
-            // A sum of two finite numbers can overflow.
-            if !self.frame.root.iter().all(|v| v.is_finite()) {
-                return Err(MotionError::syntax(file, line.number, "a root out of range", "a place near the origin"));
-            }
         }
         self.frame.rotations[bone] = joint.rotation(angles);
         Ok(())
@@ -125,5 +121,69 @@ impl Joint {
             .iter()
             .fold(UnitQuaternion::identity(), |r, axis: &FileAxis| axis.rotation(angles[axis.index()]) * r);
         self.axis * r * self.axis.inverse()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::skeleton;
+    use super::*;
+
+    const RIG: &str = "\
+:units
+  length 1
+  angle deg
+:root
+  order RX TY TX TZ RY RZ
+  axis XYZ
+  position 0 10 0
+  orientation 0 0 0
+:bonedata
+  begin
+    name arm
+    direction 0 1 0
+    length 10
+    axis 0 90 0 XYZ
+    dof rx
+  end
+:hierarchy
+  begin
+    root arm
+  end
+";
+
+    fn frames(amc: &str) -> Result<Vec<Frame>, MotionError> {
+        let rig = skeleton::parse(Path::new("a.asf"), RIG).unwrap();
+        parse(Path::new("a.amc"), amc, &rig, 120.0)
+    }
+
+    #[test]
+    fn root_values_in_any_order_and_inches() {
+        let frame = &frames("1\nroot 90 1 2 3 0 90\narm 0\n").unwrap()[0];
+        // Inches: file x 2, y 10 + 1, z 3.
+        assert!((frame.root - Vector3::new(3.0, 2.0, 11.0) * 0.0254).norm() < 1e-12);
+        // Rz(90) Rx(90): the file's y goes to z, z stays z: our z goes to x.
+        assert!((frame.rotations[0] * Vector3::z() - Vector3::x()).norm() < 1e-12);
+    }
+
+    #[test]
+    fn a_bone_turns_about_its_own_axis_in_degrees_or_radians() {
+        // The axis turned by 90 degrees about y takes x to -z: the bone turns about the file's -z, y goes to x.
+        let expected = Vector3::y();
+        let half_turn = std::f64::consts::FRAC_PI_2;
+        for text in ["1\nroot 0 0 0 0 0 0\narm 90\n", &format!(":RADIANS\n1\nroot 0 0 0 0 0 0\narm {half_turn}\n")] {
+            let got = frames(text).unwrap()[0].rotations[1] * Vector3::z();
+            assert!((got - expected).norm() < 1e-12, "{got}");
+        }
+    }
+
+    #[test]
+    fn frames_that_lack_a_bone_or_repeat_one_are_refused() {
+        let say = |text: &str| frames(text).unwrap_err().to_string();
+        assert!(say("1\nroot 0 0 0 0 0 0\n2\n").contains("a.amc:3: frame 1 ends without arm"));
+        assert!(say("1\narm 0\narm 0\n").contains("a.amc:3: arm twice in frame 1"));
+        assert!(say("arm 0\n").contains("a.amc:1: \"arm\" before the first frame"));
+        assert!(say(":DEGREES\n").contains("a.amc:1: no frames"));
+        assert!(say(":SAMPLES-PER-SECOND 60\n").contains("60 frames a second; expected 120"));
     }
 }

@@ -321,7 +321,7 @@ impl Block {
         if !(0.0..1e6).contains(&length) {
             return wrong(format!("length {length}"), "a length that is not negative");
         }
-        if length > 0.0 && !((direction.norm() - 1.0).abs() < 0.01) {
+        if length > 0.0 && !(0.99..=1.01).contains(&direction.norm()) {
             return wrong(format!("direction of length {}", direction.norm()), "a unit vector");
         }
         Ok(direction * length)

@@ -79,12 +79,8 @@ impl Between {
     fn orientation(&self, a: &Knot, b: &Knot) -> ([f64; 4], [f64; 3]) {
         let [q0, q1] = [a, b].map(|knot| unit(knot.base_orientation));
         let [omega0, omega1] = [a, b].map(|knot| Vector3::from(knot.base_angular_velocity));
-        let mut to_end = q0.inverse() * q1;
-        if to_end.w < 0.0 {
-            // The same rotation, the short way round.
-            to_end = UnitQuaternion::new_unchecked(-to_end.into_inner());
-        }
-        let end = to_end.scaled_axis();
+        // The logarithm takes the short way round, whatever the signs of the quaternions.
+        let end = (q0.inverse() * q1).scaled_axis();
         let speed = inverse_right_jacobian(&end, &omega1);
         let (mut phi, mut slope) = (Vector3::zeros(), Vector3::zeros());
         for axis in 0..3 {

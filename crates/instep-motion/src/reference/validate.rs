@@ -88,7 +88,7 @@ impl Reference {
             finite(|| field(&format!("forces[{j}]")), force)?;
         }
         let norm = knot.base_orientation.iter().map(|v| v * v).sum::<f64>().sqrt();
-        if !((norm - 1.0).abs() <= UNIT) {
+        if !(1.0 - UNIT..=1.0 + UNIT).contains(&norm) {
             return Err(wrong(field("base_orientation"), format!("norm {norm}"), "norm 1"));
         }
         Ok(())

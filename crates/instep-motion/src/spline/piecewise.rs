@@ -106,8 +106,9 @@ impl<const D: usize> CubicSpline<D> {
             }
         }
         for i in (0..n - 1).rev() {
-            for d in 0..D {
-                m[i][d] -= upper[i] * m[i + 1][d];
+            let after = m[i + 1];
+            for (here, after) in m[i].iter_mut().zip(after) {
+                *here -= upper[i] * after;
             }
         }
         let segments = (0..n - 1).map(|i| {

@@ -103,21 +103,24 @@ impl<const D: usize> Quintic<D> {
     /// [`MotionError::Argument`] if `duration` is not finite and positive.
     pub fn between(duration: f64, from: &State<D>, to: &State<D>) -> Result<Self, MotionError> {
         check_duration("duration", duration)?;
-        let mut coefficients = [[0.0; D]; 6];
         let t = duration;
-        for i in 0..D {
-            // What is left of the end state after the first three coefficients, in units of position.
+        // What is left of the end state after the first three coefficients, in units of position.
+        let left = |i: usize| {
             let (p, v, a) = (from.position[i], from.velocity[i], from.acceleration[i]);
             let dp = to.position[i] - (p + v * t + a * t * t / 2.0);
             let dv = (to.velocity[i] - (v + a * t)) * t;
             let da = (to.acceleration[i] - a) * t * t;
-            coefficients[0][i] = p;
-            coefficients[1][i] = v;
-            coefficients[2][i] = a / 2.0;
-            coefficients[3][i] = (10.0 * dp - 4.0 * dv + da / 2.0) / t.powi(3);
-            coefficients[4][i] = (-15.0 * dp + 7.0 * dv - da) / t.powi(4);
-            coefficients[5][i] = (6.0 * dp - 3.0 * dv + da / 2.0) / t.powi(5);
-        }
+            (dp, dv, da)
+        };
+        let of = |f: &dyn Fn((f64, f64, f64)) -> f64| std::array::from_fn(|i| f(left(i)));
+        let coefficients = [
+            from.position,
+            from.velocity,
+            from.acceleration.map(|a| a / 2.0),
+            of(&|(dp, dv, da)| (10.0 * dp - 4.0 * dv + da / 2.0) / t.powi(3)),
+            of(&|(dp, dv, da)| (-15.0 * dp + 7.0 * dv - da) / t.powi(4)),
+            of(&|(dp, dv, da)| (6.0 * dp - 3.0 * dv + da / 2.0) / t.powi(5)),
+        ];
         Ok(Self { coefficients, duration })
     }
 
