@@ -2,9 +2,10 @@
 //!
 //! The peak of the foot's speed is not quite the impact. In all five of CMU's clips of subject 10 the ankle, fast until
 //! then, loses a tenth to a fifth of its speed within one frame, 0.017 to 0.033 s after the ball of the foot is fastest.
-//! There the foot is at its lowest and goes level, in all five within 0.1 m of one place of the room and within 7
-//! degrees of the room's x axis (as we turn it) (mean -1.5 degrees; at the peak of speed -14 to -2, mean -8). So that is taken for
-//! the moment at which the foot meets the ball. No ball was tracked, so this too is an inference.
+//! There the foot is at its lowest and goes level, in all five within 0.1 m of one place of the recording room, and it
+//! heads within 7 degrees of the room's forward axis (our x; mean -1.5 degrees). At the peak of speed that heading is
+//! still -14 to -2 degrees (mean -8). So this is taken for the moment at which the foot meets the ball. No ball was
+//! tracked, so it too is an inference.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
