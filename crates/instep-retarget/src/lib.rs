@@ -1,1 +1,16 @@
-//! From a human clip to a reference that a robot can follow.
+//! From a human clip to a reference that a robot can follow: the offline half of paper 1 (section II-A).
+//!
+//! 1. [`rescale`]: the human's landmarks with the robot's link lengths, in the kick's own world frame.
+//! 2. [`kinematic`]: inverse kinematics over the whole clip, with joint limits, smooth in time, with the stance feet
+//!    standing still or with the clip's own foot slip.
+//!
+//! The mathematics open no file and read no clock; progress is told to a callback.
+
+mod assemble;
+pub mod banded;
+mod error;
+mod ik;
+pub mod kinematic;
+pub mod rescale;
+
+pub use error::RetargetError;
