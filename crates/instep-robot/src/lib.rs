@@ -19,8 +19,10 @@ pub mod check;
 pub mod control;
 mod data;
 mod error;
+mod meshes;
 mod robot;
 pub mod settings;
+mod warnings;
 
 pub use capsule::{SegmentPair, closest_points};
 pub use data::RobotData;

@@ -145,13 +145,20 @@ impl Robot {
         Self::resolve(&file, model_file, settings)
     }
 
-    fn resolve(file: &Path, model_file: PathBuf, settings: RobotFile) -> Result<Self, RobotError> {
+    pub(crate) fn resolve(file: &Path, model_file: PathBuf, settings: RobotFile) -> Result<Self, RobotError> {
+        sane(file, &settings)?;
         let mut spec = spec(file, &model_file, &settings)?;
         let model =
             spec.compile().map_err(|e| RobotError::Model { file: model_file.clone(), detail: e.to_string() })?;
         let names = Names { file, model: &model };
 
         let base = names.link("base.link", &settings.base.link)?;
+        let free = model.jnt_bodyid().first().map_or(base, |&link| usize::try_from(link).unwrap_or(0));
+        if free != base && model.jnt_type().first() == Some(&MjtJoint::mjJNT_FREE) {
+            let right = model.id_to_name(MjtObjBase::mjOBJ_BODY, free).unwrap_or_default();
+            let found = format!("\"{}\"", settings.base.link);
+            return Err(names.wrong("base.link", found, format!("the link with the free joint, \"{right}\"")));
+        }
         let (joints, groups) = joints(&names, &model_file, &settings)?;
         let index = |field: &str, name: &str| joint_index(&names, &joints, field, name);
         let leg = |side: &str, leg: &LegFile| -> Result<Leg, RobotError> {
@@ -277,7 +284,7 @@ impl Robot {
     /// Mass of the whole robot, kg.
     #[must_use]
     pub fn mass(&self) -> f64 {
-        self.model.totalmass()
+        self.model.body_subtreemass()[self.base]
     }
 
     /// The leg on `side`.
@@ -311,16 +318,60 @@ impl Robot {
     }
 }
 
+/// Reads a model's text. MuJoCo reads the file itself; this says what is wrong where MuJoCo or its bindings would not:
+/// a missing file, bytes that are no text, and NaN or infinity, which MuJoCo lets pass.
+pub(crate) fn read_model(file: &Path) -> Result<String, RobotError> {
+    crate::warnings::silence();
+    let bytes = std::fs::read(file).map_err(|source| RobotError::Read { file: file.to_owned(), source })?;
+    let refused = |detail: String| RobotError::Model { file: file.to_owned(), detail };
+    let text = String::from_utf8(bytes)
+        .map_err(|e| refused(format!("byte {} is no UTF-8 text", e.utf8_error().valid_up_to())))?;
+    match crate::check::not_finite(&text) {
+        Some((line, found)) => Err(refused(format!("line {line}: {found}; expected finite numbers"))),
+        None => Ok(text),
+    }
+}
+
+/// Every number of the settings is finite and no text has a NUL, which would end a name early in MuJoCo.
+fn sane(file: &Path, settings: &RobotFile) -> Result<(), RobotError> {
+    fn walk(value: &toml::Value, field: &str) -> Option<(String, String, &'static str)> {
+        match value {
+            toml::Value::Float(x) if !x.is_finite() => Some((field.to_owned(), x.to_string(), "a finite number")),
+            toml::Value::String(s) if s.contains('\0') => {
+                Some((field.to_owned(), format!("{s:?}"), "text without a NUL"))
+            }
+            toml::Value::Array(items) => {
+                items.iter().enumerate().find_map(|(i, item)| walk(item, &format!("{field}[{i}]")))
+            }
+            toml::Value::Table(table) => table.iter().find_map(|(key, item)| {
+                let field = if field.is_empty() { key.clone() } else { format!("{field}.{key}") };
+                if key.contains('\0') {
+                    return Some((format!("{field:?}"), format!("{key:?}"), "a name without a NUL"));
+                }
+                walk(item, &field)
+            }),
+            _ => None,
+        }
+    }
+    let value = toml::Value::try_from(settings)
+        .map_err(|e| RobotError::Settings { file: file.to_owned(), detail: e.to_string() })?;
+    match walk(&value, "") {
+        Some((field, found, expected)) => {
+            Err(RobotError::Field { file: file.to_owned(), field, found, expected: expected.into() })
+        }
+        None => Ok(()),
+    }
+}
+
 /// Reads the model and makes it a robot: a free joint for a URDF, no actuators, contact spheres.
 fn spec(file: &Path, model_file: &Path, settings: &RobotFile) -> Result<MjSpec, RobotError> {
-    if let Err(source) = std::fs::metadata(model_file) {
-        return Err(RobotError::Read { file: model_file.to_owned(), source });
-    }
+    let text = read_model(model_file)?;
     let refused = |detail: String| RobotError::Model { file: model_file.to_owned(), detail };
     let mut spec = MjSpec::from_xml(model_file).map_err(|e| refused(e.to_string()))?;
-    let is_urdf = model_file.extension().is_some_and(|e| e.eq_ignore_ascii_case("urdf"));
+    let is_urdf = crate::check::is_urdf(&text);
     if is_urdf {
         spec.compiler_mut().set_fusestatic(false);
+        crate::meshes::resolve(&mut spec, model_file);
     }
     let wrong = |field: String, found: &str, expected: String| RobotError::Field {
         file: file.to_owned(),

@@ -7,8 +7,10 @@
     reason = "helpers of tests may fail a test and print its figures"
 )]
 
+mod check;
 mod control;
 mod differences;
+mod fuzz;
 mod geometry;
 mod nao;
 mod oracle;
