@@ -20,6 +20,8 @@ pub mod control;
 mod data;
 mod error;
 mod meshes;
+mod model_file;
+mod names;
 mod robot;
 pub mod settings;
 mod warnings;

@@ -14,7 +14,7 @@ use crate::settings::RobotFile;
 use crate::{Robot, RobotError};
 
 pub(crate) fn check(path: &Path) -> Result<CheckReport, RobotError> {
-    let text = crate::robot::read_model(path)?;
+    let text = crate::model_file::read_model(path)?;
     let markup = markup::read(&text);
     let kind = if markup.root == "robot" { Kind::Urdf } else { Kind::Mjcf };
     let mut findings = Findings::default();
