@@ -55,7 +55,7 @@ def state(model, rng, links, loaded):
         [
             rng.uniform(-1.0, 1.0, 3),
             quaternion / np.linalg.norm(quaternion),
-            rng.uniform(model.lowerPositionLimit[7:], model.upperPositionLimit[7:]),
+            rng.uniform(-1.5, 1.5, model.nq - 7),  # joint ranges are no part of the comparison
         ]
     )
     v = rng.uniform(-3.0, 3.0, model.nv)
