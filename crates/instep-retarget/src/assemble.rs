@@ -7,14 +7,14 @@ use instep_motion::reference::{Knot, Reference, ReferenceKind, Source};
 use instep_robot::{Robot, RobotData};
 use nalgebra::Vector3;
 
-use crate::ik::Anchor;
+use crate::stance::Stance;
 
 /// A robot's motion at the clip's rate, before it becomes a reference.
 pub(crate) struct Motion<'a> {
     pub robot: &'a Robot,
     /// 7 + n a frame.
     pub positions: Vec<Vec<f64>>,
-    pub stances: &'a [Anchor],
+    pub stances: &'a [Stance],
     /// Frames a second.
     pub rate: f64,
     /// In the clip's time.

@@ -1,4 +1,4 @@
-//! Inverse kinematics of a whole clip as one least-squares problem, solved by Gauss-Newton.
+//! Inverse kinematics of a whole clip as one least-squares problem, solved by Levenberg and Marquardt's method.
 //!
 //! Source: paper 1, equation (3) with the constraints (11)-(14) and (16) as in its kinematics-only stage (after
 //! HumanMimic, reference 24 there). Unknowns are the robot's positions q_k at every frame k. The cost sums, weighted,
@@ -21,21 +21,15 @@ use crate::RetargetError;
 use crate::banded::Banded;
 use crate::kinematic::Weights;
 use crate::rescale::{Target, Targets};
+use crate::stance::Stance;
 
 /// Gauss-Newton steps for a frame of the first guess; the first frame gets more.
 const GUESS_STEPS: usize = 3;
 const FIRST_FRAME_STEPS: usize = 40;
+/// Damping values that are tried for a step before the cost counts as lowest.
+const DAMPING_TRIES: usize = 4;
 /// Gap that capsules should keep, m.
 const CLEARANCE: f64 = 0.005;
-
-/// One stretch in which a contact point stands, frames `start..end`, at the place `anchor` (m).
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Anchor {
-    pub point: usize,
-    pub start: usize,
-    pub end: usize,
-    pub place: Vector3<f64>,
-}
 
 /// A position task with what it needs at every evaluation.
 struct PointTask {
@@ -61,7 +55,7 @@ pub(crate) struct ClipIk<'a> {
     points: Vec<PointTask>,
     turns: Vec<TurnTask>,
     contacts: Vec<PointTask>,
-    pub anchors: Vec<Anchor>,
+    pub anchors: Vec<Stance>,
     /// For each frame, the anchors that hold then.
     held: Vec<Vec<usize>>,
     jacobian: Vec<f64>,
@@ -70,13 +64,26 @@ pub(crate) struct ClipIk<'a> {
 }
 
 /// The normal equations of a Gauss-Newton step.
-struct System {
+#[derive(Clone)]
+pub(crate) struct System {
     matrix: Banded,
     gradient: Vec<f64>,
     nv: usize,
 }
 
 impl System {
+    /// Empty equations for `frames` frames of `nv` unknowns, of which each is coupled to the next two.
+    pub(crate) fn new(frames: usize, nv: usize) -> Self {
+        let size = frames * nv;
+        let below = (3 * nv).min(size) - 1;
+        Self { matrix: Banded::zeros(size, below), gradient: vec![0.0; size], nv }
+    }
+
+    fn clear(&mut self) {
+        self.matrix.clear();
+        self.gradient.fill(0.0);
+    }
+
     /// Adds `weight` J^T J and `weight` J^T r of a residual with `rows` rows for the frame that starts at `offset`.
     fn add(&mut self, offset: usize, jacobian: &[f64], residual: &[f64], weight: f64, dofs: &[usize]) {
         for (row, r) in residual.iter().enumerate() {
@@ -97,7 +104,7 @@ impl System {
 }
 
 impl<'a> ClipIk<'a> {
-    pub(crate) fn new(robot: &'a Robot, targets: &'a Targets, weights: &'a Weights, anchors: Vec<Anchor>) -> Self {
+    pub(crate) fn new(robot: &'a Robot, targets: &'a Targets, weights: &'a Weights, anchors: Vec<Stance>) -> Self {
         let mut data = robot.data();
         // A pose without symmetry, in which every joint that can move a point does.
         let mut generic = robot.stand.clone();
@@ -194,14 +201,15 @@ impl<'a> ClipIk<'a> {
                 None if depth < 0.0 => Vector3::z() * depth,
                 None => continue,
             };
-            cost += task.weight * residual.norm_squared();
+            let weight = if anchor.is_some() { task.weight } else { self.weights.penetration };
+            cost += weight * residual.norm_squared();
             if let Some((system, offset)) = system.as_mut() {
                 self.data.point_jacobian_into(task.at.link, &at, &mut self.jacobian);
                 if anchor.is_some() {
-                    system.add(*offset, &self.jacobian, residual.as_slice(), task.weight, &task.dofs);
+                    system.add(*offset, &self.jacobian, residual.as_slice(), weight, &task.dofs);
                 } else {
                     let nv = system.nv;
-                    system.add(*offset, &self.jacobian[2 * nv..], &[depth], task.weight, &task.dofs);
+                    system.add(*offset, &self.jacobian[2 * nv..], &[depth], weight, &task.dofs);
                 }
             }
         }
@@ -271,7 +279,7 @@ impl<'a> ClipIk<'a> {
     /// The first guess: every frame solved alone, from the one before.
     pub(crate) fn guess(&mut self) -> Result<Vec<Vec<f64>>, RetargetError> {
         let nv = self.robot.nv();
-        let mut system = System { matrix: Banded::zeros(nv, nv - 1), gradient: vec![0.0; nv], nv };
+        let mut system = System::new(1, nv);
         let mut q = self.robot.stand.clone();
         let pelvis = self.targets.keypoints.iter().position(|k| k.at.link == self.robot.base);
         if let Some(first) = self.targets.frames.first() {
@@ -285,8 +293,7 @@ impl<'a> ClipIk<'a> {
         for frame in 0..self.targets.frames.len() {
             let steps = if frame == 0 { FIRST_FRAME_STEPS } else { GUESS_STEPS };
             for iteration in 0..steps {
-                system.matrix.clear();
-                system.gradient.fill(0.0);
+                system.clear();
                 self.frame(frame, &q, false, Some((&mut system, 0)));
                 let step = self.step(&mut system, std::slice::from_ref(&q), 1e-4, iteration)?;
                 // A long step would leave the region where the derivatives hold.
@@ -298,31 +305,36 @@ impl<'a> ClipIk<'a> {
         Ok(guesses)
     }
 
-    /// One Gauss-Newton iteration over the whole clip from `positions`; returns the new positions, or `None` where no
-    /// step length lowers the cost, and the cost before and after.
+    /// One iteration over the whole clip from `positions`; returns the new positions, or `None` where no damping lowers
+    /// the cost, and the cost before and after. `damping` is Levenberg and Marquardt's and is kept between iterations.
     pub(crate) fn iterate(
         &mut self,
         positions: &[Vec<f64>],
         rate: f64,
         iteration: usize,
+        damping: &mut f64,
+        [system, attempt]: &mut [System; 2],
     ) -> Result<(Option<Vec<Vec<f64>>>, f64, f64), RetargetError> {
         let nv = self.robot.nv();
-        let size = positions.len() * nv;
-        let mut system = System { matrix: Banded::zeros(size, 3 * nv - 1), gradient: vec![0.0; size], nv };
-        let mut cost = self.smoothness(positions, rate, Some(&mut system));
+        system.clear();
+        let mut cost = self.smoothness(positions, rate, Some(system));
         for (frame, q) in positions.iter().enumerate() {
-            cost += self.frame(frame, q, true, Some((&mut system, frame * nv)));
+            cost += self.frame(frame, q, true, Some((system, frame * nv)));
         }
-        let step = self.step(&mut system, positions, 1e-7, iteration)?;
-        for length in [1.0, 0.5, 0.25, 0.1] {
+        for _ in 0..DAMPING_TRIES {
+            attempt.matrix.copy_from(&system.matrix);
+            attempt.gradient.copy_from_slice(&system.gradient);
+            let step = self.step(attempt, positions, *damping, iteration)?;
             let mut trial = positions.to_vec();
             for (q, step) in trial.iter_mut().zip(step.chunks(nv)) {
-                self.advance(q, step, length);
+                self.advance(q, step, 1.0);
             }
             let after = self.cost(&trial, rate);
             if after < cost {
+                *damping = (*damping / 10.0).max(1e-6);
                 return Ok((Some(trial), cost, after));
             }
+            *damping *= 30.0;
         }
         Ok((None, cost, cost))
     }

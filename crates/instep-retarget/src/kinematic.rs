@@ -12,14 +12,19 @@ use instep_motion::despike;
 use instep_motion::landmark::{Landmark, Landmarks};
 use instep_motion::phase::{KickPhases, KickSettings, find_kick, kick_direction};
 use instep_motion::reference::{Reference, ReferenceKind, Source};
-use instep_robot::{ContactPoint, Robot};
+use instep_robot::Robot;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use crate::RetargetError;
 use crate::assemble;
-use crate::ik::{Anchor, ClipIk};
+use crate::ik::{ClipIk, System};
 use crate::rescale::{Targets, landmark_name, rescale};
+use crate::settle::settle;
+use crate::stance::stances;
+
+/// Iterations in which the places of standing feet still follow the motion; then they are fixed.
+const ANCHOR_SETTLING: usize = 3;
 
 /// Whether the contact schedule is enforced.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -55,8 +60,10 @@ pub struct Weights {
     pub sole_turn: f64,
     /// Turn of the toes.
     pub toe_turn: f64,
-    /// Distance of a standing contact point from its place, and depth below the ground.
+    /// Distance of a standing contact point from its place.
     pub contact: f64,
+    /// Depth of other contact points below the ground. Much larger slows the solver down.
+    pub penetration: f64,
     /// Overlap of capsules.
     pub collision: f64,
     /// Acceleration of joints and of the base's turning, in s^4/rad^2. Larger is smoother and blunts the kick.
@@ -81,7 +88,8 @@ impl Default for Weights {
             sole_turn: 0.1,
             toe_turn: 0.02,
             contact: 1e4,
-            collision: 1e3,
+            penetration: 300.0,
+            collision: 300.0,
             acceleration: 3e-10,
             base_acceleration: 3e-9,
             posture: 1e-4,
@@ -134,7 +142,7 @@ impl Default for KinematicSettings {
             rate: 30.0,
             weights: Weights::default(),
             iterations: 12,
-            tolerance: 2e-3,
+            tolerance: 1e-2,
             ball_radius: 0.11,
             contact: ContactSettings::default(),
             kick: KickSettings::default(),
@@ -215,7 +223,10 @@ pub fn retarget(
     let contacts = detect(&clip, &landmarks, &settings.contact)?;
     let phases = find_kick(&clip, &landmarks, &contacts, &settings.kick)?;
     let direction = kick_direction(&clip, &landmarks, &phases)?;
-    let targets = rescale(robot, &clip, &landmarks, &contacts, &direction)?;
+    let mut targets = rescale(robot, &clip, &landmarks, &contacts, &direction)?;
+    if settings.form == ContactForm::Enforced {
+        settle(robot, &mut targets, &contacts);
+    }
 
     let stances = stances(robot, &contacts);
     let anchors = match settings.form {
@@ -226,9 +237,14 @@ pub fn retarget(
     let mut positions = ik.guess()?;
     let mut status = Status::OutOfIterations;
     let mut iterations = 0;
+    let mut damping = 1e-4;
+    let empty = System::new(positions.len(), robot.nv());
+    let mut systems = [empty.clone(), empty];
     while iterations < settings.iterations {
-        ik.settle_anchors(&positions);
-        let (better, before, after) = ik.iterate(&positions, clip.rate, iterations)?;
+        if iterations < ANCHOR_SETTLING {
+            ik.settle_anchors(&positions);
+        }
+        let (better, before, after) = ik.iterate(&positions, clip.rate, iterations, &mut damping, &mut systems)?;
         iterations += 1;
         progress(Progress { iteration: iterations, iterations: settings.iterations, cost: after });
         let Some(better) = better else {
@@ -298,35 +314,4 @@ fn moved(mut targets: Targets, origin: &Vector3<f64>) -> Targets {
     let scaled = origin / targets.scale;
     targets.human.iter_mut().flatten().for_each(|position| *position -= scaled);
     targets
-}
-
-/// The stretches in which each of the robot's contact points stands, from the human's heel and toe.
-fn stances(robot: &Robot, contacts: &ContactSchedule) -> Vec<Anchor> {
-    let mut stances = Vec::new();
-    for (point, contact) in robot.contacts.iter().enumerate() {
-        let foot = contacts.foot(contact.leg);
-        let stands = if is_toe(robot, contact) { &foot.toe } else { &foot.heel };
-        let mut start = None;
-        for frame in 0..=stands.len() {
-            let standing = stands.get(frame).copied().unwrap_or(false);
-            match (start, standing) {
-                (None, true) => start = Some(frame),
-                (Some(first), false) => {
-                    stances.push(Anchor { point, start: first, end: frame, place: Vector3::zeros() });
-                    start = None;
-                }
-                _ => {}
-            }
-        }
-    }
-    stances
-}
-
-/// Whether a contact point follows the human's toe: it is on the toe, or on the front half of a foot without one.
-fn is_toe(robot: &Robot, contact: &ContactPoint) -> bool {
-    let leg = robot.leg(contact.leg);
-    match leg.toe_link {
-        Some(toe) => contact.at.link == toe,
-        None => contact.at.point.x > leg.sole.point.x,
-    }
 }

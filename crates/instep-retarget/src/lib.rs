@@ -12,5 +12,7 @@ mod error;
 mod ik;
 pub mod kinematic;
 pub mod rescale;
+mod settle;
+mod stance;
 
 pub use error::RetargetError;
