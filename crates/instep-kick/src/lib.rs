@@ -1,1 +1,24 @@
-//! Kick engines: what turns a request and sensor readings into joint commands.
+//! Kick engines: what turns a request and sensor readings into joint commands, so that a ball is kicked.
+//!
+//! - [`request`]: what is asked, and the causes of a refusal; [`dialect`]: the request formats that teams already send.
+//! - [`engine`]: the trait that every engine implements.
+//! - [`dynamic`]: paper 2's engine: splines of foot and trunk in the support foot's frame, stabilised by the centre of
+//!   pressure.
+//! - [`playback`]: plays a reference from a given instant, open loop.
+//! - [`tree`] and [`ik`]: kinematics without MuJoCo, and inverse kinematics with weighted goals under joint limits.
+//!
+//! An engine sees sensors, never the simulator's truth, and allocates nothing in a tick.
+
+pub mod dialect;
+pub mod dynamic;
+pub mod engine;
+mod error;
+pub mod ik;
+pub mod playback;
+pub mod request;
+pub mod tree;
+
+pub use engine::{Face, KickEngine, KickPlan, KickStatus, Phase, Progress};
+pub use error::KickError;
+pub use playback::Playback;
+pub use request::{KickRequest, Place, Refusal, Strength};

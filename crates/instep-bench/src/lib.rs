@@ -1,0 +1,1 @@
+//! KickBench: engines x robots x scenarios x seeds to one table.

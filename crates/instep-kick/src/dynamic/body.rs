@@ -1,0 +1,102 @@
+//! One robot as the dynamic engine knows it: its tree, its feet and its stand, seen from either support foot.
+
+use std::sync::Arc;
+
+use instep_motion::phase::Side;
+use instep_robot::Robot;
+use nalgebra::{Rotation3, Vector3};
+
+use crate::dynamic::foot::Foot;
+use crate::ik::Goals;
+use crate::tree::Tree;
+
+/// The robot standing, in the frame of one sole.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Stand {
+    /// The swing sole's centre, m.
+    pub(crate) home: Vector3<f64>,
+    /// Centre of mass, m.
+    pub(crate) com: Vector3<f64>,
+    /// Base height, m.
+    pub(crate) height: f64,
+    /// Base roll, pitch, yaw, rad.
+    pub(crate) base: [f64; 3],
+    /// Swing sole's yaw and pitch, rad.
+    pub(crate) yaw_pitch: [f64; 2],
+}
+
+impl Stand {
+    /// The goals that hold the stand.
+    pub(crate) fn goals(&self) -> Goals {
+        Goals {
+            position: self.home,
+            yaw_pitch: self.yaw_pitch,
+            balance: [self.com.x, self.com.y],
+            height: self.height,
+            base: self.base,
+        }
+    }
+}
+
+/// A robot with what the engine computes once.
+#[derive(Debug)]
+pub(crate) struct Body {
+    pub(crate) robot: Arc<Robot>,
+    pub(crate) tree: Tree,
+    /// Left foot, right foot.
+    pub(crate) feet: [Foot; 2],
+    /// By swing side: left, right.
+    pub(crate) stands: [Stand; 2],
+    /// Standing joint angles, rad.
+    pub(crate) angles: Vec<f64>,
+    /// Half the distance between the soles' centres, m.
+    pub(crate) half_width: f64,
+    /// Length of the straight leg from hip to sole, m.
+    pub(crate) leg_length: f64,
+}
+
+impl Body {
+    pub(crate) fn new(robot: Arc<Robot>) -> Self {
+        let tree = Tree::new(&robot);
+        let mut pose = tree.pose();
+        let angles = robot.stand[7..].to_vec();
+        tree.update(&angles, &mut pose);
+        let feet = [Side::Left, Side::Right].map(|side| Foot::new(&robot, &tree, &pose, side));
+        let stands = [Side::Left, Side::Right].map(|swing| {
+            let (support, flying) = (robot.leg(swing.other()).sole, robot.leg(swing).sole);
+            let (s, f) = (pose.point(&support), pose.point(&flying));
+            let turn = pose.rotation[support.link].transpose();
+            let relative = Rotation3::from_matrix_unchecked(turn * pose.rotation[flying.link]);
+            let (_, pitch, yaw) = relative.euler_angles();
+            let (base_roll, base_pitch, base_yaw) = Rotation3::from_matrix_unchecked(turn).euler_angles();
+            Stand {
+                home: turn * (f - s),
+                com: turn * (tree.com(&pose) - s),
+                height: (turn * (-s)).z,
+                base: [base_roll, base_pitch, base_yaw],
+                yaw_pitch: [yaw, pitch],
+            }
+        });
+        let half_width = 0.5 * stands[0].home.y.abs();
+        let leg = &robot.legs[0];
+        let length = |a: usize, b: usize| (pose.position[a] - pose.position[b]).norm();
+        let leg_length = length(leg.thigh, leg.shank) + length(leg.shank, leg.foot) - leg.sole.point.z.min(0.0);
+        Self { robot, tree, feet, stands, angles, half_width, leg_length }
+    }
+
+    /// The stand as seen from the support foot of a kick with `swing`.
+    pub(crate) fn stand(&self, swing: Side) -> &Stand {
+        &self.stands[swing as usize]
+    }
+
+    /// A footprint point in the support sole's frame of a kick with `swing`.
+    pub(crate) fn support_from_footprint(&self, swing: Side, point: [f64; 2]) -> [f64; 2] {
+        let support_y = if swing == Side::Left { -self.half_width } else { self.half_width };
+        [point[0], point[1] - support_y]
+    }
+
+    /// +1 for a left, -1 for a right swing foot: the side of the swing foot as seen from the support foot.
+    pub(crate) fn sign(swing: Side) -> f64 {
+        if swing == Side::Left { 1.0 } else { -1.0 }
+    }
+}

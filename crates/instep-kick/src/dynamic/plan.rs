@@ -1,0 +1,447 @@
+//! From a request to a motion, or the cause why not: both feet and all faces are screened by inverse kinematics at the
+//! wind-up, contact and follow-through points, and the best forecasts are checked along their whole way.
+//!
+//! Paper 2 chooses the foot by equation (1) and moves; bitbots_main#304 shows where that fails. Here equation (1) and
+//! the 45-degree rule only tip the scales between candidates that all can. The forecast of a whole motion holds joint
+//! ranges, joint speeds, motor torques (by inverse dynamics), gaps between parts of the robot, and the planned centre
+//! of pressure in the support foot.
+
+use std::f64::consts::FRAC_PI_4;
+
+use instep_motion::phase::Side;
+use nalgebra::{Vector2, Vector3};
+
+use crate::dynamic::body::Body;
+use crate::dynamic::foot::{contact_point, paper_choice, paper_face};
+use crate::dynamic::motion::{Motion, Stroke, goals, trunk_support};
+use crate::dynamic::settings::DynamicSettings;
+use crate::dynamic::torque::Dynamics;
+use crate::engine::{Face, KickPlan, Phase};
+use crate::ik::{Ik, Residual};
+use crate::request::{KickRequest, Place, Refusal, Strength};
+use crate::tree::TreePose;
+
+/// Steps of inverse kinematics to a place that is far from the last.
+const FAR: usize = 10;
+/// The same to a place near the last.
+const NEAR: usize = 3;
+/// Sampling of the forecast, s: in the kick, and elsewhere.
+const FINE: f64 = 0.012;
+const COARSE: f64 = 0.04;
+
+/// What a candidate looks like at its three places.
+#[derive(Debug, Clone, Copy)]
+struct Candidate {
+    stroke: Stroke,
+    /// Lower is better.
+    cost: f64,
+    effective_mass: f64,
+    ball_speed: f64,
+}
+
+/// A motion that was forecast to be possible.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Planned {
+    pub(crate) motion: Motion,
+    pub(crate) stroke: Stroke,
+    pub(crate) plan: KickPlan,
+}
+
+/// Scratch space of the planner.
+#[derive(Debug)]
+pub(crate) struct Planner {
+    ik: Ik,
+    pose: TreePose,
+    angles: Vec<f64>,
+    saved: Vec<f64>,
+    /// Joint angles with the left or right foot lifted over its place.
+    lifted: [Vec<f64>; 2],
+    dynamics: Dynamics,
+}
+
+/// Distance that a residual counts as, m: 1 rad is 0.1 m.
+fn miss(residual: &Residual) -> f64 {
+    residual.position + 0.1 * residual.orientation + 0.5 * residual.balance
+}
+
+/// Angle in (-pi, pi].
+fn wrap(angle: f64) -> f64 {
+    angle.sin().atan2(angle.cos())
+}
+
+impl Planner {
+    pub(crate) fn new(body: &Body, settings: &DynamicSettings, ik: Ik, dynamics: Dynamics) -> Self {
+        let mut planner = Self {
+            ik,
+            pose: body.tree.pose(),
+            angles: body.angles.clone(),
+            saved: body.angles.clone(),
+            lifted: [body.angles.clone(), body.angles.clone()],
+            dynamics,
+        };
+        for swing in [Side::Left, Side::Right] {
+            planner.angles.copy_from_slice(&body.angles);
+            let home = body.stand(swing).home;
+            let foot = [home.x, home.y, settings.swing.lift, 0.0, 0.0];
+            let goals = goals(&foot, &trunk_support(body, settings, swing, 0.0));
+            planner.ik.solve(&body.tree, &mut planner.pose, &mut planner.angles, swing, &goals, 30);
+            planner.lifted[swing as usize].copy_from_slice(&planner.angles);
+        }
+        planner
+    }
+
+    /// Plans `request`.
+    pub(crate) fn plan(
+        &mut self,
+        body: &Body,
+        settings: &DynamicSettings,
+        request: &KickRequest,
+    ) -> Result<Planned, Refusal> {
+        request.check()?;
+        // When the contact comes decides where a moving ball is, and the other way round: a few rounds settle it.
+        let moving = Vector2::from(request.ball_velocity).norm() > 0.02;
+        let mut contact = settings.times.shift + settings.times.settle + 3.0 * settings.times.foot_least;
+        let mut result = self.plan_at(body, settings, request, if moving { contact } else { 0.0 });
+        if moving {
+            for _ in 0..3 {
+                match &result {
+                    Ok(planned) if (planned.plan.contact - contact).abs() > 0.005 => contact = planned.plan.contact,
+                    _ => break,
+                }
+                result = self.plan_at(body, settings, request, contact);
+            }
+        }
+        let planned = result?;
+        if let Some(deadline) = request.deadline
+            && planned.plan.contact > deadline
+        {
+            return Err(Refusal::TooLate { contact: planned.plan.contact, deadline });
+        }
+        if let Some(asked) = request.precision
+            && planned.plan.precision > asked
+        {
+            return Err(Refusal::TooImprecise { asked, possible: planned.plan.precision });
+        }
+        Ok(planned)
+    }
+
+    /// Plans for a ball that is where it will be after `time` (s).
+    fn plan_at(
+        &mut self,
+        body: &Body,
+        settings: &DynamicSettings,
+        request: &KickRequest,
+        time: f64,
+    ) -> Result<Planned, Refusal> {
+        let (ball, velocity) = roll(request.ball, request.ball_velocity, settings.ball.deceleration, time);
+        check_place(body, settings, ball)?;
+        let mut candidates: [Option<Candidate>; 6] = [None; 6];
+        let mut refusal: Option<Refusal> = None;
+        let mut count = 0;
+        for swing in [Side::Left, Side::Right] {
+            if request.foot.is_some_and(|foot| foot != swing) {
+                continue;
+            }
+            for face in [Face::Front, Face::Inner, Face::Outer] {
+                match self.screen(body, settings, request, ball, velocity, swing, face) {
+                    Some(Ok(candidate)) => candidates[count] = Some(candidate),
+                    Some(Err(cause)) => refusal = Some(graver(refusal, cause)),
+                    None => {}
+                }
+                count += 1;
+            }
+        }
+        candidates.sort_by(|a, b| {
+            let cost = |c: &Option<Candidate>| c.map_or(f64::INFINITY, |c| c.cost);
+            cost(a).total_cmp(&cost(b))
+        });
+        // The best forecasts are enough: what the third best cannot do, the sixth will not.
+        for candidate in candidates.iter().flatten().take(3) {
+            let motion = Motion::kick(body, settings, &candidate.stroke);
+            match self.forecast(body, settings, &motion, &candidate.stroke) {
+                Ok(()) => {
+                    let front = candidate.stroke.face == Face::Front;
+                    let plan = KickPlan {
+                        foot: candidate.stroke.swing,
+                        face: candidate.stroke.face,
+                        contact: motion.contact.unwrap_or(0.0),
+                        duration: motion.end(),
+                        foot_speed: candidate.stroke.speed,
+                        ball_speed: candidate.ball_speed,
+                        precision: if front { settings.accuracy.front } else { settings.accuracy.side },
+                    };
+                    return Ok(Planned { motion, stroke: candidate.stroke, plan });
+                }
+                Err(cause) => refusal = Some(graver(refusal, cause)),
+            }
+        }
+        Err(refusal.unwrap_or(Refusal::Unreachable { foot: Side::Right, place: Place::Contact, gap: f64::INFINITY }))
+    }
+
+    /// Looks at one foot and face: `None` when the foot would have to turn too far.
+    fn screen(
+        &mut self,
+        body: &Body,
+        settings: &DynamicSettings,
+        request: &KickRequest,
+        ball: [f64; 2],
+        velocity: [f64; 2],
+        swing: Side,
+        face: Face,
+    ) -> Option<Result<Candidate, Refusal>> {
+        let s = &settings.swing;
+        let point = *body.feet[swing as usize].face(face);
+        // A moving ball keeps its speed: the impulse must point from it to the wanted velocity.
+        let ball_velocity = Vector2::from(velocity);
+        let wanted_speed = |mass: f64| match request.strength {
+            Strength::BallSpeed(v) => v,
+            Strength::FootSpeed(v) => v * gain(settings, mass),
+            Strength::Distance(d) => (2.0 * settings.ball.deceleration * d).sqrt(),
+        };
+        let aim = Vector2::new(request.direction.cos(), request.direction.sin()) * wanted_speed(1.0) - ball_velocity;
+        let direction = if ball_velocity.norm() > 0.02 { aim.y.atan2(aim.x) } else { request.direction };
+        let yaw = wrap(direction - point.angle);
+        if yaw.abs() > s.yaw {
+            return None;
+        }
+        let height = (settings.ball.radius + s.height - point.axis.z).max(s.sole_least);
+        let center = Vector2::from(body.support_from_footprint(swing, ball));
+        let contact = contact_point(center, direction, &point, yaw, height, settings.ball.radius);
+        let mut stroke = Stroke {
+            swing,
+            face,
+            yaw,
+            contact,
+            direction,
+            windup: s.windup,
+            follow: s.follow,
+            speed: 1.0,
+        };
+
+        // Contact first: where it is out of reach, nothing else matters.
+        self.angles.copy_from_slice(&self.lifted[swing as usize]);
+        if let Err(cause) = self.reach(body, settings, &stroke, contact, Place::Contact, FAR) {
+            return Some(Err(cause));
+        }
+        self.saved.copy_from_slice(&self.angles);
+        let limit = self.limit_margin(body);
+
+        // Effective mass, foot speed, and the share of the joints' speeds that it takes.
+        self.dynamics.fill(body, swing.other(), &self.angles, &self.pose);
+        let toward = Vector3::new(direction.cos(), direction.sin(), 0.0);
+        let strike = contact + nalgebra::Rotation3::from_axis_angle(&Vector3::z_axis(), yaw) * point.axis;
+        let mass = self.dynamics.effective_mass(body.robot.leg(swing).foot, &strike, &toward);
+        let ball_speed = wanted_speed(mass);
+        let change = (Vector2::new(request.direction.cos(), request.direction.sin()) * ball_speed - ball_velocity).norm();
+        let along = ball_velocity.dot(&toward.xy());
+        stroke.speed = (change / gain(settings, mass) * settings.ball.speed_gain + along).max(0.1);
+        let ahead = 0.01;
+        let beyond = self.reach(body, settings, &stroke, contact + toward * ahead, Place::Contact, NEAR);
+        let share = body
+            .robot
+            .joints
+            .iter()
+            .enumerate()
+            .map(|(j, joint)| ((self.angles[j] - self.saved[j]) / ahead * stroke.speed / joint.speed, j))
+            .fold((0.0_f64, 0), |most, (share, j)| if share.abs() > most.0 { (share.abs(), j) } else { most });
+        if beyond.is_ok() && share.0 > settings.limits.speed {
+            let cause = Refusal::TooFast { foot: swing, asked: stroke.speed, share: share.0, joint: share.1 };
+            return Some(Err(cause));
+        }
+
+        // The longest wind-up and follow-through there is room for.
+        let mut failure = None;
+        let shares = [1.0, 0.7, 0.45, 0.0];
+        let fits = shares.into_iter().find_map(|share| {
+            stroke.windup = s.windup_least + share * (s.windup - s.windup_least);
+            self.angles.copy_from_slice(&self.saved);
+            let place = stroke.windup_point();
+            self.reach(body, settings, &stroke, place, Place::WindUp, FAR).map_err(|e| failure = Some(e)).ok()
+        });
+        if fits.is_none() {
+            return failure.map(Err);
+        }
+        let fits = shares.into_iter().find_map(|share| {
+            stroke.follow = s.follow * (0.3 + 0.7 * share);
+            self.angles.copy_from_slice(&self.saved);
+            let place = stroke.follow_point();
+            self.reach(body, settings, &stroke, place, Place::FollowThrough, FAR).map_err(|e| failure = Some(e)).ok()
+        });
+        if fits.is_none() {
+            return failure.map(Err);
+        }
+        let paper = paper_choice(request.ball, request.direction, s.corridor);
+        let mut cost = share.0 / settings.limits.speed;
+        cost += 0.8 * (1.0 - stroke.windup / s.windup) + 0.3 * (1.0 - stroke.follow / s.follow);
+        cost += 0.4 * yaw.abs() / FRAC_PI_4 + if face == Face::Front { 0.0 } else { 0.3 };
+        cost += 0.3 * (1.0 - limit / 0.1).clamp(0.0, 1.0);
+        cost -= if paper == swing { 0.15 } else { 0.0 };
+        cost -= if paper_face(swing, request.direction) == face { 0.15 } else { 0.0 };
+        Some(Ok(Candidate { stroke, cost, effective_mass: mass, ball_speed })
+            .inspect(|c: &Candidate| debug_assert!(c.effective_mass > 0.0)))
+    }
+
+    /// Moves the foot to `place` by inverse kinematics and judges the pose.
+    fn reach(
+        &mut self,
+        body: &Body,
+        settings: &DynamicSettings,
+        stroke: &Stroke,
+        place: Vector3<f64>,
+        what: Place,
+        steps: usize,
+    ) -> Result<(), Refusal> {
+        let foot = [place.x, place.y, place.z, stroke.yaw, 0.0];
+        let trunk = trunk_support(body, settings, stroke.swing, stroke.yaw);
+        let goals = goals(&foot, &trunk);
+        let residual = self.ik.solve(&body.tree, &mut self.pose, &mut self.angles, stroke.swing, &goals, steps);
+        let gap = miss(&residual);
+        // Written so that a NaN fails.
+        if !matches!(gap.partial_cmp(&settings.limits.reach), Some(o) if o.is_le()) {
+            return Err(Refusal::Unreachable { foot: stroke.swing, place: what, gap });
+        }
+        let gap = body.tree.least_gap(&self.pose);
+        if gap < settings.limits.clearance {
+            return Err(Refusal::SelfCollision { foot: stroke.swing, gap });
+        }
+        Ok(())
+    }
+
+    /// Distance of the present angles from the nearest joint limit, rad.
+    fn limit_margin(&self, body: &Body) -> f64 {
+        self.ik
+            .joints()
+            .map(|j| {
+                let [low, high] = body.robot.joints[j].range;
+                (self.angles[j] - low).min(high - self.angles[j])
+            })
+            .fold(f64::INFINITY, f64::min)
+    }
+
+    /// Follows a whole motion.
+    pub(crate) fn forecast(
+        &mut self,
+        body: &Body,
+        settings: &DynamicSettings,
+        motion: &Motion,
+        stroke: &Stroke,
+    ) -> Result<(), Refusal> {
+        let swing = stroke.swing;
+        let support = swing.other();
+        let limits = &settings.limits;
+        self.angles.copy_from_slice(&self.lifted[swing as usize]);
+        let (start, end) = (motion.end_of(Phase::Raise), motion.end_of(Phase::MoveBack));
+        let contact = motion.contact.unwrap_or(end);
+        let fast = [motion.end_of(Phase::WindUp) - 2.0 * FINE, motion.end_of(Phase::Kick) + FINE];
+        let foot = &body.feet[support as usize];
+        let mut time = start;
+        let mut fine = 0;
+        while time < end {
+            let goals = motion.goals(time);
+            let residual = self.ik.solve(&body.tree, &mut self.pose, &mut self.angles, swing, &goals, NEAR);
+            let gap = miss(&residual);
+            if !matches!(gap.partial_cmp(&limits.reach), Some(o) if o.is_le()) {
+                return Err(Refusal::Unreachable { foot: swing, place: Place::Way, gap });
+            }
+            let gap = body.tree.least_gap(&self.pose);
+            if gap < limits.clearance {
+                return Err(Refusal::SelfCollision { foot: swing, gap });
+            }
+            let quick = (fast[0]..fast[1]).contains(&time);
+            if quick {
+                if fine == 0 {
+                    self.dynamics.fill(body, support, &self.angles, &self.pose);
+                } else {
+                    self.dynamics.push(body, support, &self.angles, &self.pose);
+                }
+                fine += 1;
+            }
+            if quick && fine >= 3 {
+                // The pose is one sample ahead of the middle: good enough for axes of a forecast.
+                let zmp = self.dynamics.solve(body, swing, &self.pose, FINE, false);
+                let [(speed, fastest), (torque, strongest)] = self.dynamics.shares(&body.robot);
+                // After the contact a joint may lag: nothing depends on it.
+                if time <= contact + FINE {
+                    if speed > limits.speed {
+                        let cause = Refusal::TooFast { foot: swing, asked: stroke.speed, share: speed, joint: fastest };
+                        return Err(cause);
+                    }
+                    if torque > limits.torque {
+                        let cause =
+                            Refusal::TooFast { foot: swing, asked: stroke.speed, share: torque, joint: strongest };
+                        return Err(cause);
+                    }
+                }
+                let by = [(zmp[0], foot.stand_x), (zmp[1], foot.stand_y)]
+                    .map(|(p, [low, high])| (low + limits.edge - p).max(p - high + limits.edge))
+                    .into_iter()
+                    .fold(f64::NEG_INFINITY, f64::max);
+                if by > 0.0 {
+                    return Err(Refusal::OffBalance { foot: swing, by });
+                }
+            }
+            time += if quick { FINE } else { COARSE.min((fast[0] - time).max(FINE)) };
+            if !quick && time >= fast[1] {
+                time = time.max(fast[1]);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Ball speed over foot speed for an effective mass (kg) of the foot (facts/physics-of-the-kick.md).
+fn gain(settings: &DynamicSettings, mass: f64) -> f64 {
+    (1.0 + settings.ball.restitution) * mass / (mass + settings.ball.mass)
+}
+
+/// Where a ball is (m) and how it moves (m/s) after `time` (s) of rolling with `deceleration` (m/s^2).
+pub(crate) fn roll(ball: [f64; 2], velocity: [f64; 2], deceleration: f64, time: f64) -> ([f64; 2], [f64; 2]) {
+    let speed = velocity[0].hypot(velocity[1]);
+    if speed < 1e-6 || time <= 0.0 {
+        return (ball, velocity);
+    }
+    let t = time.min(speed / deceleration);
+    let way = (speed - 0.5 * deceleration * t) * t / speed;
+    let left = (speed - deceleration * t) / speed;
+    ([ball[0] + velocity[0] * way, ball[1] + velocity[1] * way], velocity.map(|v| v * left))
+}
+
+/// The refusals that need no kinematics.
+fn check_place(body: &Body, settings: &DynamicSettings, ball: [f64; 2]) -> Result<(), Refusal> {
+    let distance = ball[0].hypot(ball[1]);
+    let reach = body.leg_length + settings.ball.radius;
+    if distance > reach {
+        return Err(Refusal::TooFar { distance, reach });
+    }
+    // The rectangle of both feet and what is between them.
+    let [left, right] = &body.feet;
+    let y = [right.outline_y[0] - body.half_width, left.outline_y[1] + body.half_width];
+    let x = left.outline_x;
+    let outside = |value: f64, [low, high]: [f64; 2]| (low - value).max(value - high).max(0.0);
+    let gap = outside(ball[0], x).hypot(outside(ball[1], y)) - settings.ball.radius;
+    let least = -0.25 * settings.ball.radius;
+    if gap < least {
+        return Err(Refusal::BallUnderRobot { gap, least });
+    }
+    if ball[0] < x[0] {
+        return Err(Refusal::BallBehind { x: ball[0], least: x[0] });
+    }
+    Ok(())
+}
+
+/// The refusal that tells more: what came nearest to being possible.
+fn graver(old: Option<Refusal>, new: Refusal) -> Refusal {
+    let rank = |r: &Refusal| match r {
+        Refusal::Unreachable { place: Place::Contact, gap, .. } => -gap.min(10.0),
+        Refusal::Unreachable { gap, .. } => 1.0 - gap.min(0.9),
+        Refusal::SelfCollision { .. } => 2.0,
+        Refusal::OffBalance { .. } => 3.0,
+        Refusal::TooFast { share, .. } => 5.0 - (share / 100.0).min(0.9),
+        _ => 9.0,
+    };
+    match old {
+        Some(old) if rank(&old) >= rank(&new) => old,
+        _ => new,
+    }
+}
+

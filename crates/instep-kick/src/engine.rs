@@ -1,0 +1,122 @@
+//! What every kick engine is: it plans a request or says why not, is ticked with sensors, tells how far it is, and can
+//! be cancelled at any tick.
+//!
+//! An engine sees the request and [`Sensors`], never the simulator's truth; it reads no clock (time comes with the
+//! sensors) and allocates nothing in a tick.
+
+use instep_motion::phase::Side;
+use instep_robot::control::{Controller, Sensors};
+use serde::Serialize;
+
+use crate::request::{KickRequest, Refusal};
+
+/// Where in a kick an engine is (paper 2, section 3.1, with the shift of weight before and after).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Phase {
+    /// Stands on both feet; no kick is under way.
+    Stand,
+    /// The weight goes over the support foot.
+    Shift,
+    /// The kicking foot leaves the ground.
+    Raise,
+    /// The kicking foot goes to the wind-up point, and waits there if told to.
+    WindUp,
+    /// From the wind-up point through the ball to rest.
+    Kick,
+    /// The kicking foot goes back over its place.
+    MoveBack,
+    /// The kicking foot goes down.
+    Lower,
+    /// The weight goes back between the feet.
+    ShiftBack,
+}
+
+/// What was planned.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct KickPlan {
+    /// The foot that kicks.
+    pub foot: Side,
+    /// Which part of it strikes.
+    pub face: Face,
+    /// Instant of contact, s after the plan (later by the time that the foot is held).
+    pub contact: f64,
+    /// End of the whole motion, standing again, s after the plan.
+    pub duration: f64,
+    /// Speed of the foot at contact, m/s.
+    pub foot_speed: f64,
+    /// Forecast speed of the ball, m/s.
+    pub ball_speed: f64,
+    /// Stated standard deviation of the direction, rad.
+    pub precision: f64,
+}
+
+/// Which part of the foot strikes the ball.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Face {
+    /// The toe.
+    Front,
+    /// The side toward the other foot.
+    Inner,
+    /// The side away from it.
+    Outer,
+}
+
+/// How a kick ended or goes on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum KickStatus {
+    /// No kick was asked yet.
+    Idle,
+    /// Under way.
+    Running,
+    /// The foot waits retracted for [`KickEngine::release`].
+    Holding,
+    /// Over; the robot stands.
+    Finished,
+    /// A cancel is under way: the foot goes back.
+    Cancelling,
+    /// Cancelled; the robot stands.
+    Cancelled,
+}
+
+/// How far a kick is.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Progress {
+    /// What goes on.
+    pub status: KickStatus,
+    /// Where in the kick.
+    pub phase: Phase,
+    /// Share of the whole motion that is done, 0 to 1 (dialect A's `percent_done` is 100 times this).
+    pub done: f64,
+    /// Time to the contact, s; negative after it, `None` when none is planned.
+    pub to_contact: Option<f64>,
+    /// The kicking foot, while a kick is under way.
+    pub foot: Option<Side>,
+}
+
+/// A kick engine. As a [`Controller`] it is ticked once a control period and holds the stand when there is no kick.
+pub trait KickEngine: Controller {
+    /// Short name for tables.
+    fn name(&self) -> &'static str;
+
+    /// Period at which it wants to be ticked, s.
+    fn control_period(&self) -> f64;
+
+    /// Plans `request` from the present `sensors`; the next tick starts the motion. May allocate.
+    ///
+    /// # Errors
+    /// Why this kick is not possible; the robot goes on as before.
+    fn plan(&mut self, request: &KickRequest, sensors: &Sensors) -> Result<KickPlan, Refusal>;
+
+    /// Lets a held foot kick at the next tick.
+    fn release(&mut self);
+
+    /// Gives the kick up at the next tick: the foot goes back and the robot stands on both feet again. Before the foot
+    /// has been lifted, at once; after contact it changes nothing but the status.
+    fn cancel(&mut self);
+
+    /// How far it is.
+    fn progress(&self) -> Progress;
+}

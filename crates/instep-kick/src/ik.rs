@@ -1,0 +1,348 @@
+//! Inverse kinematics of both legs with weighted goals, under joint limits: the part that BioIK plays in paper 2
+//! (section 4.3, goals relative to any link).
+//!
+//! Problem: find leg joint angles so that, in the support sole's frame, the swing sole has a wanted pose, the base a
+//! wanted height and orientation, and the centre of mass a wanted place. Each step solves the damped least-squares
+//! problem (Levenberg, A method for the solution of certain non-linear problems, 1944)
+//!
+//! min | W (J dx - e) |^2 + lambda |dx|^2   subject to   lo <= x + dx <= hi,  |dx| <= step
+//!
+//! by an active set: the free unknowns are solved by Cholesky, those that leave their bounds are fixed there, and the
+//! rest is solved again. With twelve unknowns a step takes a few microseconds. Joints that one motor turns are one
+//! unknown. Finds the nearest local solution from where it starts; allocates nothing after `new`.
+
+use instep_motion::phase::Side;
+use instep_robot::{LinkPoint, Robot};
+use nalgebra::{Matrix3, Rotation3, Vector3};
+
+use crate::KickError;
+use crate::tree::{Tree, TreePose};
+
+/// Most unknowns: two legs of seven joints.
+const UNKNOWNS: usize = 14;
+/// Rows: swing pose 6, base height 1, base orientation 3, centre of mass 2.
+const ROWS: usize = 12;
+/// Largest change of a joint in one step, rad.
+const STEP: f64 = 0.4;
+
+/// Importance of each goal; the residual times this is what is minimised.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Weights {
+    /// Swing sole's position, 1/m.
+    pub position: f64,
+    /// Swing sole's orientation, 1/rad.
+    pub orientation: f64,
+    /// Base height, 1/m.
+    pub height: f64,
+    /// Base roll and pitch, 1/rad.
+    pub tilt: f64,
+    /// Base yaw, 1/rad.
+    pub yaw: f64,
+    /// Centre of mass, 1/m.
+    pub balance: f64,
+    /// Damping.
+    pub damping: f64,
+}
+
+impl Default for Weights {
+    fn default() -> Self {
+        Self { position: 100.0, orientation: 30.0, height: 15.0, tilt: 8.0, yaw: 0.8, balance: 60.0, damping: 0.03 }
+    }
+}
+
+/// What is wanted, in the support sole's frame (origin at the sole's centre, the foot's axes).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Goals {
+    /// Swing sole's centre, m.
+    pub position: Vector3<f64>,
+    /// Swing sole's yaw, then pitch, rad.
+    pub yaw_pitch: [f64; 2],
+    /// Centre of mass over the ground, m.
+    pub balance: [f64; 2],
+    /// Base link's height, m.
+    pub height: f64,
+    /// Base roll, pitch, yaw, rad.
+    pub base: [f64; 3],
+}
+
+/// How far a solution is from its goals.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Residual {
+    /// Swing sole's position, m.
+    pub position: f64,
+    /// Swing sole's orientation, rad.
+    pub orientation: f64,
+    /// Centre of mass, m.
+    pub balance: f64,
+    /// Base tilt, rad.
+    pub tilt: f64,
+    /// Base height, m.
+    pub height: f64,
+}
+
+/// The solver for one robot; scratch space of one thread.
+#[derive(Debug, Clone)]
+pub struct Ik {
+    /// Joints of each unknown: one, or two that one motor turns.
+    unknowns: Vec<[Option<usize>; 2]>,
+    ranges: Vec<[f64; 2]>,
+    soles: [LinkPoint; 2],
+    weights: Weights,
+    jacobian: [[f64; UNKNOWNS]; ROWS],
+    error: [f64; ROWS],
+    normal: [[f64; UNKNOWNS]; UNKNOWNS],
+    factor: [[f64; UNKNOWNS]; UNKNOWNS],
+    gradient: [f64; UNKNOWNS],
+    step: [f64; UNKNOWNS],
+}
+
+impl Ik {
+    /// For `robot`, whose pairs of joints in `coupled` are turned by one motor each; `margin` (rad) is kept from every
+    /// joint limit.
+    ///
+    /// # Errors
+    /// When a coupled joint is not there, or the legs have more than fourteen joints.
+    pub fn new(robot: &Robot, coupled: &[[String; 2]], margin: f64) -> Result<Self, KickError> {
+        let mut unknowns: Vec<[Option<usize>; 2]> = Vec::new();
+        for leg in &robot.legs {
+            // The toe keeps its standing angle.
+            for joint in leg.joints().filter(|joint| Some(*joint) != leg.toe) {
+                let name = &robot.joints[joint].name;
+                let partner = coupled.iter().find_map(|[a, b]| match name {
+                    n if n == a => Some(b),
+                    n if n == b => Some(a),
+                    _ => None,
+                });
+                let partner = partner
+                    .map(|p| {
+                        robot.joint_index(p).ok_or_else(|| KickError::Setting {
+                            field: "coupled".into(),
+                            found: format!("\"{p}\""),
+                            expected: format!("a joint of {}", robot.name),
+                        })
+                    })
+                    .transpose()?;
+                if !unknowns.iter().any(|known| known[1] == Some(joint)) {
+                    unknowns.push([Some(joint), partner]);
+                }
+            }
+        }
+        if unknowns.len() > UNKNOWNS {
+            return Err(KickError::Setting {
+                field: "leg".into(),
+                found: format!("{} joints in both legs", unknowns.len()),
+                expected: format!("at most {UNKNOWNS}"),
+            });
+        }
+        let ranges = unknowns
+            .iter()
+            .map(|joints| {
+                let mut range = [f64::NEG_INFINITY, f64::INFINITY];
+                for joint in joints.iter().flatten() {
+                    let [low, high] = robot.joints[*joint].range;
+                    range = [range[0].max(low + margin), range[1].min(high - margin)];
+                }
+                range
+            })
+            .collect();
+        Ok(Self {
+            unknowns,
+            ranges,
+            soles: [robot.legs[0].sole, robot.legs[1].sole],
+            weights: Weights::default(),
+            jacobian: [[0.0; UNKNOWNS]; ROWS],
+            error: [0.0; ROWS],
+            normal: [[0.0; UNKNOWNS]; UNKNOWNS],
+            factor: [[0.0; UNKNOWNS]; UNKNOWNS],
+            gradient: [0.0; UNKNOWNS],
+            step: [0.0; UNKNOWNS],
+        })
+    }
+
+    /// The joints that it moves.
+    pub fn joints(&self) -> impl Iterator<Item = usize> {
+        self.unknowns.iter().flatten().flatten().copied()
+    }
+
+    /// Takes at most `steps` steps from `angles` toward `goals` with `swing` as the swing foot; stops when a step is
+    /// under a microradian. `angles` and `pose` agree afterwards.
+    pub fn solve(
+        &mut self,
+        tree: &Tree,
+        pose: &mut TreePose,
+        angles: &mut [f64],
+        swing: Side,
+        goals: &Goals,
+        steps: usize,
+    ) -> Residual {
+        tree.update(angles, pose);
+        let mut residual = self.linearise(tree, pose, swing, goals);
+        for _ in 0..steps {
+            self.least_squares(angles);
+            let mut largest: f64 = 0.0;
+            for (joints, step) in self.unknowns.iter().zip(&self.step) {
+                largest = largest.max(step.abs());
+                for joint in joints.iter().flatten() {
+                    angles[*joint] += step;
+                }
+            }
+            tree.update(angles, pose);
+            residual = self.linearise(tree, pose, swing, goals);
+            if largest < 1e-6 {
+                break;
+            }
+        }
+        residual
+    }
+
+    /// Jacobian and error in the present pose.
+    fn linearise(&mut self, tree: &Tree, pose: &TreePose, swing: Side, goals: &Goals) -> Residual {
+        let (support, flying) = (&self.soles[swing.other() as usize], &self.soles[swing as usize]);
+        let (s, f) = (pose.point(support), pose.point(flying));
+        let turn = pose.rotation[support.link].transpose();
+        let w = self.weights;
+
+        // Where things are in the support sole's frame.
+        let position = turn * (f - s);
+        let base = turn * (-s);
+        let com_base = tree.com(pose);
+        let com = turn * (com_base - s);
+        let wanted = Rotation3::from_axis_angle(&Vector3::z_axis(), goals.yaw_pitch[0])
+            * Rotation3::from_axis_angle(&Vector3::y_axis(), goals.yaw_pitch[1]);
+        let orientation_error = log(&(wanted.into_inner() * (turn * pose.rotation[flying.link]).transpose()));
+        let [roll, pitch, yaw] = goals.base;
+        let base_error = log(&(Rotation3::from_euler_angles(roll, pitch, yaw).into_inner() * turn.transpose()));
+        let position_error = goals.position - position;
+        let balance_error = [goals.balance[0] - com.x, goals.balance[1] - com.y];
+        let height_error = goals.height - base.z;
+
+        for k in 0..3 {
+            self.error[k] = w.position * position_error[k];
+            self.error[3 + k] = w.orientation * orientation_error[k];
+        }
+        self.error[6] = w.height * height_error;
+        self.error[7] = w.tilt * base_error.x;
+        self.error[8] = w.tilt * base_error.y;
+        self.error[9] = w.yaw * base_error.z;
+        self.error[10] = w.balance * balance_error[0];
+        self.error[11] = w.balance * balance_error[1];
+
+        for (n, joints) in self.unknowns.iter().enumerate() {
+            let mut column = [0.0; ROWS];
+            for &joint in joints.iter().flatten() {
+                let omega_s = tree.turn_column(pose, joint, support.link);
+                let v_s = tree.point_column(pose, joint, support.link, &s);
+                let v_f = tree.point_column(pose, joint, flying.link, &f);
+                let omega_f = tree.turn_column(pose, joint, flying.link);
+                let v_c = tree.com_column(pose, joint);
+                // d/dt R^T (p - s) = R^T (v - v_s - omega_s x (p - s)).
+                let d_position = turn * (v_f - v_s - omega_s.cross(&(f - s)));
+                let d_orientation = turn * (omega_f - omega_s);
+                let d_base = turn * (-v_s + omega_s.cross(&s));
+                let d_tilt = -(turn * omega_s);
+                let d_com = turn * (v_c - v_s - omega_s.cross(&(com_base - s)));
+                for k in 0..3 {
+                    column[k] += w.position * d_position[k];
+                    column[3 + k] += w.orientation * d_orientation[k];
+                }
+                column[6] += w.height * d_base.z;
+                column[7] += w.tilt * d_tilt.x;
+                column[8] += w.tilt * d_tilt.y;
+                column[9] += w.yaw * d_tilt.z;
+                column[10] += w.balance * d_com.x;
+                column[11] += w.balance * d_com.y;
+            }
+            for (row, value) in self.jacobian.iter_mut().zip(column) {
+                row[n] = value;
+            }
+        }
+        Residual {
+            position: position_error.norm(),
+            orientation: orientation_error.norm(),
+            balance: balance_error[0].hypot(balance_error[1]),
+            tilt: base_error.xy().norm(),
+            height: height_error.abs(),
+        }
+    }
+
+    /// The box-constrained damped least-squares step, into `self.step`.
+    fn least_squares(&mut self, angles: &[f64]) {
+        let n = self.unknowns.len();
+        for i in 0..n {
+            for j in 0..=i {
+                let sum: f64 = (0..ROWS).map(|r| self.jacobian[r][i] * self.jacobian[r][j]).sum();
+                self.normal[i][j] = sum;
+                self.normal[j][i] = sum;
+            }
+            self.normal[i][i] += self.weights.damping;
+            self.gradient[i] = (0..ROWS).map(|r| self.jacobian[r][i] * self.error[r]).sum();
+        }
+        let mut fixed = [false; UNKNOWNS];
+        self.step = [0.0; UNKNOWNS];
+        // Each round fixes at least one unknown, so there are at most n rounds.
+        for _ in 0..=n {
+            self.solve_free(n, &fixed);
+            let mut clean = true;
+            for i in 0..n {
+                if fixed[i] {
+                    continue;
+                }
+                let x = self.unknowns[i][0].map_or(0.0, |joint| angles[joint]);
+                let [low, high] = self.ranges[i];
+                let (low, high) = ((low - x).clamp(-STEP, 0.0), (high - x).clamp(0.0, STEP));
+                if self.step[i] < low || self.step[i] > high {
+                    self.step[i] = self.step[i].clamp(low, high);
+                    fixed[i] = true;
+                    clean = false;
+                }
+            }
+            if clean {
+                break;
+            }
+        }
+    }
+
+    /// Solves for the unknowns that are not fixed, given the steps of those that are.
+    fn solve_free(&mut self, n: usize, fixed: &[bool; UNKNOWNS]) {
+        let mut free = [0; UNKNOWNS];
+        let mut count = 0;
+        for i in (0..n).filter(|&i| !fixed[i]) {
+            free[count] = i;
+            count += 1;
+        }
+        let mut right = [0.0; UNKNOWNS];
+        for a in 0..count {
+            let i = free[a];
+            right[a] = self.gradient[i]
+                - (0..n).filter(|&j| fixed[j]).map(|j| self.normal[i][j] * self.step[j]).sum::<f64>();
+        }
+        // Cholesky; the damping keeps the matrix positive definite.
+        for a in 0..count {
+            for b in 0..=a {
+                let mut sum = self.normal[free[a]][free[b]];
+                for c in 0..b {
+                    sum -= self.factor[a][c] * self.factor[b][c];
+                }
+                self.factor[a][b] = if a == b { sum.max(1e-12).sqrt() } else { sum / self.factor[b][b] };
+            }
+        }
+        for a in 0..count {
+            for c in 0..a {
+                right[a] -= self.factor[a][c] * right[c];
+            }
+            right[a] /= self.factor[a][a];
+        }
+        for a in (0..count).rev() {
+            for c in a + 1..count {
+                right[a] -= self.factor[c][a] * right[c];
+            }
+            right[a] /= self.factor[a][a];
+            self.step[free[a]] = right[a];
+        }
+    }
+}
+
+/// Rotation vector of a rotation matrix.
+fn log(matrix: &Matrix3<f64>) -> Vector3<f64> {
+    Rotation3::from_matrix_unchecked(*matrix).scaled_axis()
+}

@@ -1,0 +1,252 @@
+//! What a team asks of a kick, and the causes for which an engine may say no.
+//!
+//! Frame of every request: the robot's footprint, that is the ground point midway between the two soles' centres (REP
+//! 120), x along the mean heading of the soles, y left, z up. SI units, radians. Nothing here plans; the dialects of
+//! other teams (facts/kick-interfaces.md, A to F) are read in [`crate::dialect`].
+
+use instep_motion::phase::Side;
+use serde::{Deserialize, Serialize};
+
+/// How strong a kick should be.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Strength {
+    /// Speed of the ball as it leaves, m/s.
+    BallSpeed(f64),
+    /// Speed of the foot at contact, m/s (paper 2's and dialect A's `kick_speed`).
+    FootSpeed(f64),
+    /// How far the ball should roll, m; the engine's rolling deceleration turns it into a speed.
+    Distance(f64),
+}
+
+impl Strength {
+    /// The number, whatever it means.
+    #[must_use]
+    pub fn value(self) -> f64 {
+        match self {
+            Self::BallSpeed(v) | Self::FootSpeed(v) | Self::Distance(v) => v,
+        }
+    }
+}
+
+/// One kick that is wanted.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct KickRequest {
+    /// Ball's centre on the ground plane in the footprint frame, m.
+    pub ball: [f64; 2],
+    /// Ball's velocity in the footprint frame, m/s.
+    #[serde(default)]
+    pub ball_velocity: [f64; 2],
+    /// Wanted direction of the ball, rad from x toward y.
+    pub direction: f64,
+    /// Wanted strength.
+    pub strength: Strength,
+    /// Largest acceptable standard deviation of the direction, rad; `None`: any.
+    #[serde(default)]
+    pub precision: Option<f64>,
+    /// Latest acceptable instant of contact, s after the plan; `None`: any.
+    #[serde(default)]
+    pub deadline: Option<f64>,
+    /// Hold the foot retracted until [`crate::KickEngine::release`] (dialect E's `finishKick`).
+    #[serde(default)]
+    pub hold: bool,
+    /// The foot to kick with; `None`: the engine chooses.
+    #[serde(default)]
+    pub foot: Option<Side>,
+}
+
+impl KickRequest {
+    /// A kick of a resting ball at `ball` (m) toward `direction` (rad) that sends it off at `speed` (m/s).
+    #[must_use]
+    pub fn new(ball: [f64; 2], direction: f64, speed: f64) -> Self {
+        Self {
+            ball,
+            ball_velocity: [0.0; 2],
+            direction,
+            strength: Strength::BallSpeed(speed),
+            precision: None,
+            deadline: None,
+            hold: false,
+            foot: None,
+        }
+    }
+
+    /// The first thing in it that is not a finite number, or a strength that is not above zero.
+    ///
+    /// # Errors
+    /// [`Refusal::NotFinite`] or [`Refusal::NoStrength`].
+    pub fn check(&self) -> Result<(), Refusal> {
+        let fields = [
+            ("ball", self.ball[0]),
+            ("ball", self.ball[1]),
+            ("ball_velocity", self.ball_velocity[0]),
+            ("ball_velocity", self.ball_velocity[1]),
+            ("direction", self.direction),
+            ("strength", self.strength.value()),
+            ("precision", self.precision.unwrap_or(0.0)),
+            ("deadline", self.deadline.unwrap_or(0.0)),
+        ];
+        if let Some((field, _)) = fields.iter().find(|(_, value)| !value.is_finite()) {
+            return Err(Refusal::NotFinite { field });
+        }
+        if self.strength.value() <= 0.0 {
+            return Err(Refusal::NoStrength { asked: self.strength.value() });
+        }
+        Ok(())
+    }
+}
+
+/// Why an engine will not kick. Said before the robot moves.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, thiserror::Error)]
+#[serde(rename_all = "snake_case", tag = "cause")]
+pub enum Refusal {
+    /// A field of the request is NaN or infinite.
+    #[error("{field} is not a finite number")]
+    NotFinite {
+        /// The field.
+        field: &'static str,
+    },
+    /// A strength of zero or below.
+    #[error("a strength of {asked} cannot move a ball; expected a number above 0")]
+    NoStrength {
+        /// As asked.
+        asked: f64,
+    },
+    /// The ball is behind the robot.
+    #[error("the ball is behind the robot (x {x:.3} m, at least {least:.3} m is needed)")]
+    BallBehind {
+        /// Ball's x, m.
+        x: f64,
+        /// Least x of a ball that is not behind, m.
+        least: f64,
+    },
+    /// The ball overlaps a foot or lies between the feet.
+    #[error("the ball is under the robot ({gap:.3} m from a foot's outline, at least {least:.3} m is needed)")]
+    BallUnderRobot {
+        /// Distance from the ball's surface to the nearest foot's outline, negative where they overlap, m.
+        gap: f64,
+        /// What is needed, m.
+        least: f64,
+    },
+    /// The ball is farther away than a leg is long: walk first.
+    #[error("the ball is {distance:.2} m away, farther than the {reach:.2} m that a leg can reach: walk to it first")]
+    TooFar {
+        /// Distance of the ball's centre from the footprint, m.
+        distance: f64,
+        /// Largest distance, m.
+        reach: f64,
+    },
+    /// No foot pose on the way is within the joints' ranges.
+    #[error("the {foot} foot misses its {place} by {gap:.3} m within the joints' ranges")]
+    Unreachable {
+        /// The foot that came nearest.
+        foot: Side,
+        /// Which place of the swing.
+        place: Place,
+        /// How far off, m (1 rad of orientation counts as 0.1 m).
+        gap: f64,
+    },
+    /// On the way two parts of the robot would touch.
+    #[error("with the {foot} foot two parts of the robot come within {gap:.3} m of each other")]
+    SelfCollision {
+        /// The foot.
+        foot: Side,
+        /// Smallest gap, m; negative is an overlap.
+        gap: f64,
+    },
+    /// The motors cannot do it.
+    #[error("{asked:.2} m/s at the {foot} foot asks {share:.2} times what joint {joint} can do")]
+    TooFast {
+        /// The foot.
+        foot: Side,
+        /// Foot speed asked, m/s.
+        asked: f64,
+        /// Largest share of a joint's speed or torque limit.
+        share: f64,
+        /// Index of that joint.
+        joint: usize,
+    },
+    /// The planned centre of pressure leaves the support foot.
+    #[error("with the {foot} foot the robot would tip: centre of pressure {by:.3} m outside the support foot")]
+    OffBalance {
+        /// The kicking foot.
+        foot: Side,
+        /// How far outside, m.
+        by: f64,
+    },
+    /// The contact would come after the deadline.
+    #[error("the contact would come after {contact:.2} s, the deadline is {deadline:.2} s")]
+    TooLate {
+        /// Instant of contact, s after the plan.
+        contact: f64,
+        /// The deadline, s.
+        deadline: f64,
+    },
+    /// The engine cannot aim that well.
+    #[error("a standard deviation of {asked:.3} rad is asked, {possible:.3} rad is what this kick has")]
+    TooImprecise {
+        /// As asked, rad.
+        asked: f64,
+        /// What the engine's settings state for this kind of kick, rad.
+        possible: f64,
+    },
+    /// A kick is under way.
+    #[error("a kick is under way; cancel it first")]
+    Busy,
+    /// The robot does not stand as it should before a kick.
+    #[error("the robot is not in its standing pose: joint {joint} is {off:.2} rad off")]
+    NotStanding {
+        /// Index of the joint.
+        joint: usize,
+        /// How far off, rad.
+        off: f64,
+    },
+}
+
+impl Refusal {
+    /// A short name for tables.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::NotFinite { .. } => "not_finite",
+            Self::NoStrength { .. } => "no_strength",
+            Self::BallBehind { .. } => "ball_behind",
+            Self::BallUnderRobot { .. } => "ball_under_robot",
+            Self::TooFar { .. } => "too_far",
+            Self::Unreachable { .. } => "unreachable",
+            Self::SelfCollision { .. } => "self_collision",
+            Self::TooFast { .. } => "too_fast",
+            Self::OffBalance { .. } => "off_balance",
+            Self::TooLate { .. } => "too_late",
+            Self::TooImprecise { .. } => "too_imprecise",
+            Self::Busy => "busy",
+            Self::NotStanding { .. } => "not_standing",
+        }
+    }
+}
+
+/// A place of the swing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Place {
+    /// The wind-up point of equation (2).
+    WindUp,
+    /// Where the foot meets the ball.
+    Contact,
+    /// Where the foot comes to rest after it.
+    FollowThrough,
+    /// Between these.
+    Way,
+}
+
+impl std::fmt::Display for Place {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::WindUp => "wind-up point",
+            Self::Contact => "contact point",
+            Self::FollowThrough => "follow-through point",
+            Self::Way => "way",
+        })
+    }
+}
