@@ -19,6 +19,26 @@ pub struct WorldSettings {
     pub step: Step,
     /// Sensor noise and delay.
     pub sensors: SensorNoise,
+    /// How the robot in the world differs from the model that its controller knows.
+    pub model_error: ModelError,
+}
+
+/// How the robot in the world differs from the model that its controller knows.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ModelError {
+    /// Factor on the mass and inertia of every link that has both in the model file.
+    pub mass: f64,
+    /// Shift of the base link's centre of mass in its frame, m.
+    pub base_shift: [f64; 3],
+    /// Dry friction of every joint as a share of its torque limit, in [0, 0.5].
+    pub joint_friction: f64,
+}
+
+impl Default for ModelError {
+    fn default() -> Self {
+        Self { mass: 1.0, base_shift: [0.0; 3], joint_friction: 0.0 }
+    }
 }
 
 /// The ground.
@@ -163,6 +183,12 @@ impl WorldSettings {
             check(&format!("{name}.restitution"), e, e > 0.0 && e < 1.0, "a number between 0 and 1")?;
             not_negative(&format!("{name}.friction"), law.friction)?;
         }
+        positive("model_error.mass", self.model_error.mass)?;
+        for shift in self.model_error.base_shift {
+            check("model_error.base_shift", shift, shift.abs() <= 0.2, "a shift of at most 0.2 m")?;
+        }
+        let friction = self.model_error.joint_friction;
+        check("model_error.joint_friction", friction, (0.0..=0.5).contains(&friction), "a share in [0, 0.5]")?;
         positive("step.far", self.step.far)?;
         positive("step.near", self.step.near)?;
         positive("step.near_distance", self.step.near_distance)?;

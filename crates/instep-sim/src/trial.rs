@@ -159,6 +159,40 @@ pub fn run(robot: &Arc<Robot>, settings: &TrialSettings, controller: &mut dyn Co
 /// # Errors
 /// As [`run`].
 pub fn run_in(world: &mut World, settings: &TrialSettings, controller: &mut dyn Controller) -> Result<Trial, SimError> {
+    run_disturbed(world, settings, &[], controller)
+}
+
+/// Something that happens to robot or ball in a trial, whatever the controller does.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Disturbance {
+    /// A force on the base link's centre of mass, world frame.
+    Push {
+        /// When it starts, s.
+        time: f64,
+        /// How long it lasts, s.
+        duration: f64,
+        /// N.
+        force: [f64; 3],
+    },
+    /// The ball is put elsewhere.
+    MoveBall {
+        /// When, s.
+        time: f64,
+        /// Its new state.
+        ball: BallState,
+    },
+}
+
+/// As [`run_in`], with `disturbances`. A push that starts or ends during the impact makes the audit's re-run differ.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_disturbed(
+    world: &mut World,
+    settings: &TrialSettings,
+    disturbances: &[Disturbance],
+    controller: &mut dyn Controller,
+) -> Result<Trial, SimError> {
     let robot = Arc::clone(world.robot());
     let far = settings.world.step.far;
     let whole = |time: f64| (time / far).round().max(1.0) as usize;
@@ -178,6 +212,22 @@ pub fn run_in(world: &mut World, settings: &TrialSettings, controller: &mut dyn 
         if step % period == 0 {
             suite.read_into(world.time(), &mut sensors);
             controller.tick(&sensors, &mut command);
+        }
+        for disturbance in disturbances {
+            match *disturbance {
+                Disturbance::Push { time, duration, force } => {
+                    if step == whole(time) {
+                        world.push(force);
+                    } else if step == whole(time + duration) {
+                        world.push([0.0; 3]);
+                    }
+                }
+                Disturbance::MoveBall { time, ref ball } => {
+                    if step == whole(time) {
+                        world.place_ball(ball);
+                    }
+                }
+            }
         }
         log.note(world, &command, &watch);
         world.advance(&command, Some(&mut watch))?;

@@ -19,7 +19,7 @@ use nalgebra::{Matrix3, Vector3};
 use crate::SimError;
 use crate::contact_law::{SOLIMP, solref};
 use crate::impact::ImpactWatch;
-use crate::settings::WorldSettings;
+use crate::settings::{ModelError, WorldSettings};
 
 const FLOOR: &str = "instep_floor";
 const BALL: &str = "instep_ball";
@@ -208,6 +208,24 @@ impl World {
             }
         }
         Ok(())
+    }
+
+    /// Pushes the base link's centre of mass with `force` (N, world frame) from now on; zero ends the push.
+    pub fn push(&mut self, force: [f64; 3]) {
+        let base = self.robot.base;
+        self.data.xfrc_applied_mut()[base][..3].copy_from_slice(&force);
+    }
+
+    /// Puts the ball where `ball` says, as a hand or another player would.
+    pub fn place_ball(&mut self, ball: &BallState) {
+        let (nq, nv) = (self.robot.nq(), self.robot.nv());
+        let qpos = self.data.qpos_mut();
+        qpos[nq..nq + 3].copy_from_slice(&ball.position);
+        qpos[nq + 3..nq + 7].copy_from_slice(&ball.orientation);
+        let qvel = self.data.qvel_mut();
+        qvel[nv..nv + 3].copy_from_slice(&ball.velocity);
+        qvel[nv + 3..nv + 6].copy_from_slice(&ball.angular_velocity);
+        self.data.forward();
     }
 
     /// One physics step of `dt` (s).
@@ -455,6 +473,24 @@ fn build(spec: &mut MjSpec, robot: &Robot, settings: &WorldSettings) -> Result<(
         .map(geom_name)
         .collect();
     body_geoms.retain(|name| !on_foot.contains(name));
+    let error = &settings.model_error;
+    if *error != ModelError::default() {
+        let links = robot.model().body_parentid().len();
+        for link in 1..links {
+            let Some(body) = spec.world_body_mut().child_mut(robot.link_name(link)) else { continue };
+            body.set_mass(body.mass() * error.mass);
+            body.fullinertia_mut().iter_mut().for_each(|entry| *entry *= error.mass);
+            body.inertia_mut().iter_mut().for_each(|entry| *entry *= error.mass);
+            if link == robot.base {
+                body.ipos_mut().iter_mut().zip(error.base_shift).for_each(|(at, shift)| *at += shift);
+            }
+        }
+        for joint in spec.joint_iter_mut() {
+            if let Some(limits) = robot.joint_index(joint.name()).map(|j| &robot.joints[j]) {
+                joint.set_frictionloss(error.joint_friction * limits.torque);
+            }
+        }
+    }
 
     let world = spec.world_body_mut();
     world
