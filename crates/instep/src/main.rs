@@ -1,2 +1,61 @@
-//! Instep command line.
-fn main() {}
+//! Instep's command line: reads what the user asked for, runs it, and ends with a code that tells how it went.
+//!
+//! Exit codes: 0, the command did what was asked (a kick that falls or fails its audit is a result, not an error);
+//! 1, it could not; 2, something handed in cannot be used: one message on standard error says what and what would be
+//! right, and nothing was written.
+
+mod failure;
+mod figure;
+mod files;
+mod kick;
+mod mujoco_log;
+mod output;
+mod places;
+mod retarget;
+mod robot;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+use output::Output;
+
+/// Kicks a ball with a humanoid robot, in simulation, from human motion.
+#[derive(Debug, Parser)]
+#[command(name = "instep", version, propagate_version = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+    /// Print one JSON object on standard output instead of text. SI units; degrees only where a key ends in _deg
+    #[arg(long, global = true)]
+    json: bool,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Let a robot play a kick reference against a ball, and measure what happens
+    Kick(kick::Kick),
+    /// Turn a human kick (ASF/AMC or BVH) into a reference for a robot
+    Retarget(retarget::Retarget),
+    /// Look at a robot's own files
+    #[command(subcommand)]
+    Robot(robot::RobotCommand),
+}
+
+fn main() -> ExitCode {
+    mujoco_log::listen();
+    let cli = Cli::parse();
+    let output = Output::new(cli.json);
+    let done = match cli.command {
+        Command::Kick(kick) => kick.run(&output),
+        Command::Retarget(retarget) => retarget.run(&output),
+        Command::Robot(command) => command.run(&output),
+    };
+    match done {
+        Ok(code) => code,
+        Err(failure) => {
+            output.complain(&failure);
+            failure.code()
+        }
+    }
+}

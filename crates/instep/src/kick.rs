@@ -1,0 +1,230 @@
+//! `instep kick`: a robot plays a reference against a ball; what happens is measured, audited, shown and recorded.
+
+mod page;
+mod recording;
+mod summary;
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Arc;
+
+use clap::Args;
+use instep_kick::Playback;
+use instep_motion::reference::{Reference, ReferenceKind};
+use instep_robot::Robot;
+use instep_sim::BallState;
+use instep_sim::settings::WorldSettings;
+use instep_sim::trial::{self, Trial, TrialSettings};
+use serde::Serialize;
+
+use crate::failure::Failure;
+use crate::output::Output;
+use crate::{files, places};
+
+/// How long the trial goes on after the reference's impact, at least, s: time for the ball to fly and the robot to fall.
+const AFTERMATH: f64 = 1.2;
+/// The longest trial, s.
+const LONGEST: f64 = 120.0;
+
+/// The arguments of `instep kick`.
+#[derive(Debug, Args)]
+pub(crate) struct Kick {
+    /// The motion to play: a file that `instep retarget` wrote
+    #[arg(long, value_name = "FILE", default_value = "references/prestoe/10_03_kinematic.json")]
+    reference: PathBuf,
+    /// The robot: a name, or the path of its folder or robot.toml [default: the reference's]
+    #[arg(long, value_name = "ROBOT")]
+    robot: Option<String>,
+    /// Where the ball lies, in metres: x along the kick, y to its left [default: the reference's ball]
+    #[arg(long, value_name = "X,Y", allow_hyphen_values = true, value_parser = point)]
+    ball: Option<[f64; 2]>,
+    /// Where in the reference to start, in seconds [default: where the support foot is planted]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    start: Option<f64>,
+    /// How long to simulate, in seconds [default: to the reference's end, and 1.2 s past its impact]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    duration: Option<f64>,
+    /// Seed of all sensor noise
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Folder for report.html and kick.mcap
+    #[arg(long, value_name = "FOLDER", default_value = "out/kick")]
+    out: PathBuf,
+    /// Constants of the world, as TOML; what is absent keeps its default
+    #[arg(long, value_name = "FILE")]
+    world: Option<PathBuf>,
+}
+
+/// `x,y` in metres.
+fn point(text: &str) -> Result<[f64; 2], String> {
+    let number = |part: &str| part.trim().parse::<f64>().ok().filter(|x| x.is_finite());
+    text.split_once(',')
+        .and_then(|(x, y)| Some([number(x)?, number(y)?]))
+        .ok_or_else(|| "expected two numbers in metres, such as 0.0,-0.02".into())
+}
+
+/// Everything about one kick that was tried.
+struct Tried {
+    robot: Arc<Robot>,
+    reference: Arc<Reference>,
+    reference_file: PathBuf,
+    /// Where in the reference it started, s.
+    start: f64,
+    settings: TrialSettings,
+    trial: Trial,
+    report: PathBuf,
+    recording: PathBuf,
+}
+
+impl Kick {
+    /// Runs the command.
+    ///
+    /// # Errors
+    /// When something handed in cannot be used or the simulation diverges. How the kick went is no error.
+    pub(crate) fn run(self, output: &Output) -> Result<ExitCode, Failure> {
+        let world = self.world.as_deref().map(world_settings).transpose()?.unwrap_or_default();
+        let reference_file = places::reference(&self.reference)?;
+        let reference = Arc::new(Reference::load(&reference_file)?);
+        let robot = Arc::new(places::robot(self.robot.as_deref().unwrap_or(&reference.robot))?);
+        let phases = &reference.phases;
+        let start = self.start.unwrap_or_else(|| phases.t_plant.min(phases.t_swing).max(0.0));
+        let mut engine = Playback::new(&robot, Arc::clone(&reference), start)
+            .map_err(|error| Failure::from(error).about(reference_file.display()))?;
+        let until = reference.duration().max(phases.t_impact + AFTERMATH);
+        let duration = self.duration.unwrap_or(until - start);
+        if !(duration > 0.0 && duration <= LONGEST) {
+            let message = format!("--duration: {duration}; expected seconds above 0, at most {LONGEST}");
+            return Err(Failure::input(message));
+        }
+        let (report, recording) = (self.out.join("report.html"), self.out.join("kick.mcap"));
+        for file in [&report, &recording] {
+            files::check_file(file)?;
+        }
+
+        let [x, y] = self.ball.unwrap_or([reference.ball[0], reference.ball[1]]);
+        let (q, v) = engine.initial_state();
+        let settings = TrialSettings {
+            world,
+            seed: self.seed,
+            duration,
+            control_period: world.step.far,
+            q,
+            v,
+            ball: BallState::at_rest([x, y, world.ball.radius]),
+            direction: 0.0,
+        };
+        let trial = trial::run(&robot, &settings, &mut engine)?;
+        let tried = Tried { robot, reference, reference_file, start, settings, trial, report, recording };
+        tried.write()?;
+        output.show(&Measures::new(&tried), |paint| summary::text(&tried, paint))?;
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+/// Reads and checks the constants of the world.
+fn world_settings(path: &Path) -> Result<WorldSettings, Failure> {
+    places::existing_file("--world", path, "constants of the world (TOML)")?;
+    let text = std::fs::read_to_string(path)
+        .map_err(|e| Failure::input(format!("{}: cannot be read: {e}; expected TOML", path.display())))?;
+    let settings: WorldSettings = toml::from_str(&text)
+        .map_err(|e| Failure::input(format!("{}: {}", path.display(), e.to_string().trim_end())))?;
+    settings.validate().map_err(|e| Failure::from(e).about(path.display()))?;
+    Ok(settings)
+}
+
+impl Tried {
+    /// Writes report and recording, both or neither.
+    fn write(&self) -> Result<(), Failure> {
+        let mut batch = files::Batch::default();
+        page::page(self).save(batch.stage(&self.report)?)?;
+        recording::recording(self)?.save(batch.stage(&self.recording)?)?;
+        batch.commit()
+    }
+
+    /// How the reference was made, in words.
+    fn kind(&self) -> &'static str {
+        match self.reference.kind {
+            ReferenceKind::KinematicSlip => "kinematic, the clip's foot slip kept",
+            ReferenceKind::Kinematic => "kinematic, stance feet still",
+            ReferenceKind::Kinodynamic => "kinodynamic",
+        }
+    }
+}
+
+/// What `--json` prints. Keys are stable: they may be added to, never renamed. SI units; degrees where the key says so.
+#[derive(Debug, Serialize)]
+struct Measures<'a> {
+    /// m/s; null when the ball was not touched. To be believed only if `audit` is "valid".
+    ball_speed: Option<f64>,
+    /// From the wanted to the real direction, positive to the left.
+    direction_error_deg: Option<f64>,
+    launch_angle_deg: Option<f64>,
+    foot_speed: Option<f64>,
+    effective_mass: Option<f64>,
+    restitution: Option<f64>,
+    audit: &'static str,
+    audit_reason: String,
+    upright: bool,
+    fell_at: Option<f64>,
+    limit_violations: &'a [trial::LimitViolation],
+    impact_time: Option<f64>,
+    contact_time: Option<f64>,
+    contact_link: Option<&'a str>,
+    touches: usize,
+    rerun_ball_speed: Option<f64>,
+    energy_gain: Option<f64>,
+    support_slip: Option<f64>,
+    ball_start: [f64; 3],
+    ball_end: [f64; 3],
+    groups: &'a [trial::GroupPeak],
+    segments: &'a [trial::SegmentPeak],
+    robot: &'a str,
+    reference: &'a Path,
+    reference_kind: ReferenceKind,
+    reference_start: f64,
+    reference_duration: f64,
+    duration: f64,
+    seed: u64,
+    report: &'a Path,
+    recording: &'a Path,
+}
+
+impl<'a> Measures<'a> {
+    fn new(tried: &'a Tried) -> Self {
+        let trial = &tried.trial;
+        let impact = trial.impact.as_ref();
+        Self {
+            ball_speed: impact.map(|i| i.ball_speed()),
+            direction_error_deg: trial.direction_error.map(f64::to_degrees),
+            launch_angle_deg: trial.launch_angle.map(f64::to_degrees),
+            foot_speed: impact.map(|i| i.foot_speed),
+            effective_mass: impact.map(|i| i.effective_mass),
+            restitution: impact.map(|i| i.restitution),
+            audit: trial.audit.verdict(),
+            audit_reason: trial.audit.reason(),
+            upright: trial.upright(),
+            fell_at: trial.fell_at,
+            limit_violations: &trial.limit_violations,
+            impact_time: impact.map(|i| i.time),
+            contact_time: impact.map(|i| i.duration),
+            contact_link: impact.map(|i| i.link.as_str()),
+            touches: impact.map_or(0, |i| i.touches),
+            rerun_ball_speed: trial.audit.rerun_ball_speed,
+            energy_gain: trial.audit.energy_gain,
+            support_slip: trial.support_slip,
+            ball_start: tried.settings.ball.position,
+            ball_end: trial.ball_end,
+            groups: &trial.groups,
+            segments: &trial.segments,
+            robot: &tried.robot.name,
+            reference: &tried.reference_file,
+            reference_kind: tried.reference.kind,
+            reference_start: tried.start,
+            reference_duration: tried.reference.duration(),
+            duration: tried.settings.duration,
+            seed: tried.settings.seed,
+            report: &tried.report,
+            recording: &tried.recording,
+        }
+    }
+}

@@ -1,0 +1,107 @@
+//! What the user reads: results on standard output, as text or as one JSON object; errors on standard error.
+//!
+//! A reader that has gone (`instep kick | head -1`) is no error.
+
+use std::io::{IsTerminal, Write};
+
+use serde::Serialize;
+
+use crate::failure::Failure;
+use crate::mujoco_log;
+
+/// How to speak to the user.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Output {
+    json: bool,
+    colour: bool,
+}
+
+impl Output {
+    /// `json`: one object on standard output instead of text. Text is coloured on a terminal, unless NO_COLOR is set.
+    pub(crate) fn new(json: bool) -> Self {
+        let colour = std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|v| v.is_empty());
+        Self { json, colour }
+    }
+
+    /// Prints a result: `object` for machines (NaN becomes null) or `text` for people.
+    ///
+    /// # Errors
+    /// When standard output cannot be written for another reason than that its reader has gone.
+    pub(crate) fn show(&self, object: &impl Serialize, text: impl FnOnce(Paint) -> String) -> Result<(), Failure> {
+        let text = if self.json {
+            serde_json::to_string(object).map_err(Failure::other)?
+        } else {
+            text(Paint { on: self.colour }).trim_end().to_owned()
+        };
+        match writeln!(std::io::stdout().lock(), "{text}") {
+            Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
+                Err(Failure::other(format!("standard output: cannot be written: {error}")))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Tells why the command did not do what was asked.
+    pub(crate) fn complain(&self, failure: &Failure) {
+        let on = std::io::stderr().is_terminal() && self.colour;
+        let label = Paint { on }.bad("error:");
+        let warnings = mujoco_log::warnings();
+        let aside =
+            if warnings.is_empty() { String::new() } else { format!("\n(MuJoCo warned: {})", warnings.join("; ")) };
+        // Nobody is left to be told when standard error is closed.
+        let _ = writeln!(std::io::stderr().lock(), "{label} {}{aside}", failure.message());
+    }
+}
+
+/// Colours, where the reader sees them.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Paint {
+    on: bool,
+}
+
+impl Paint {
+    fn with(self, code: &str, text: &str) -> String {
+        if self.on { format!("\x1b[{code}m{text}\x1b[0m") } else { text.to_owned() }
+    }
+
+    /// As wanted.
+    pub(crate) fn good(self, text: &str) -> String {
+        self.with("32", text)
+    }
+
+    /// Close to a limit, or worth a look.
+    pub(crate) fn warn(self, text: &str) -> String {
+        self.with("33", text)
+    }
+
+    /// Not as wanted.
+    pub(crate) fn bad(self, text: &str) -> String {
+        self.with("31", text)
+    }
+
+    /// The number that matters.
+    pub(crate) fn strong(self, text: &str) -> String {
+        self.with("1", text)
+    }
+
+    /// Labels and details.
+    pub(crate) fn faint(self, text: &str) -> String {
+        self.with("2", text)
+    }
+
+    /// A bar of ten cells for `share` of a limit, and the share in per cent.
+    pub(crate) fn bar(self, share: f64) -> String {
+        const EIGHTHS: [&str; 8] = ["", "▏", "▎", "▍", "▌", "▋", "▊", "▉"];
+        // The cast saturates; NaN gives an empty bar.
+        let eighths = ((share * 80.0).round() as usize).min(80);
+        let bar = format!("{}{}", "█".repeat(eighths / 8), EIGHTHS[eighths % 8]);
+        let text = format!("{bar:<10} {:>3.0} %", share * 100.0);
+        if share > 0.995 {
+            self.bad(&text)
+        } else if share > 0.8 {
+            self.warn(&text)
+        } else {
+            self.good(&text)
+        }
+    }
+}

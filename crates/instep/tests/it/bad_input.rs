@@ -1,0 +1,182 @@
+//! Bad input: one error that names file, place, what was wrong and what would be right; code 2; nothing written.
+
+use std::path::{Path, PathBuf};
+
+use crate::support::{assert_refused, clip, instep, leg_swing, listing, prestoe};
+
+/// A folder with everything that a good run needs: `swing.json`, `kick.asf`, `kick_01.amc`, `kick.bvh`, `prestoe/`.
+fn workspace() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    leg_swing().save(&at("swing.json")).unwrap();
+    for name in ["kick.asf", "kick_01.amc", "kick.bvh"] {
+        std::fs::copy(clip(name), at(name)).unwrap();
+    }
+    std::fs::create_dir(at("prestoe")).unwrap();
+    for name in ["robot.toml", "prestoe.xml"] {
+        std::fs::copy(prestoe().join(name), at("prestoe").join(name)).unwrap();
+    }
+    folder
+}
+
+fn edit(file: PathBuf, change: impl FnOnce(String) -> String) {
+    let text = std::fs::read_to_string(&file).unwrap();
+    let changed = change(text.clone());
+    assert_ne!(text, changed, "{} was not changed", file.display());
+    std::fs::write(file, changed).unwrap();
+}
+
+/// The command is refused with an error that holds `words`.
+fn refused(folder: &Path, arguments: &[&str], words: &[&str]) {
+    let before = listing(folder);
+    for json in [&[][..], &["--json"]] {
+        let output = instep(folder, &[arguments, json].concat());
+        assert_refused(&output, words, folder, &before);
+    }
+}
+
+const AMC: [&str; 5] = ["retarget", "--skeleton", "kick.asf", "--clip", "kick_01.amc"];
+const BVH: [&str; 5] = ["retarget", "--clip", "kick.bvh", "--unit", "1"];
+const KICK: [&str; 3] = ["kick", "--reference", "swing.json"];
+
+#[test]
+fn a_missing_file() {
+    let folder = workspace();
+    let folder = folder.path();
+    refused(folder, &["kick", "--reference", "none.json"], &["none.json", "no such file", "expected", "--reference"]);
+    refused(folder, &[&KICK[..], &["--robot", "nobody"]].concat(), &["nobody", "no such robot", "prestoe"]);
+    refused(folder, &[&KICK[..], &["--world", "none.toml"]].concat(), &["none.toml", "no such file", "--world"]);
+    refused(folder, &["retarget", "--clip", "none.amc"], &["none.amc", "no such file", ".bvh", "--clip"]);
+    let skeleton = ["retarget", "--clip", "kick_01.amc", "--skeleton", "none.asf"];
+    refused(folder, &skeleton, &["none.asf", "no such file", "--skeleton"]);
+    refused(folder, &["robot", "check", "none"], &["none", "no such file", "expected"]);
+    std::fs::remove_file(folder.join("kick.asf")).unwrap();
+    refused(folder, &["retarget", "--clip", "kick_01.amc"], &["kick.asf", "cannot be read"]);
+    std::fs::remove_file(folder.join("prestoe/prestoe.xml")).unwrap();
+    refused(folder, &[&KICK[..], &["--robot", "./prestoe"]].concat(), &["prestoe.xml", "cannot be read"]);
+}
+
+#[test]
+fn a_truncated_file() {
+    for (name, arguments) in [
+        ("kick_01.amc", &AMC[..]),
+        ("kick.asf", &AMC[..]),
+        ("kick.bvh", &BVH[..]),
+        ("swing.json", &KICK[..]),
+        ("prestoe/robot.toml", &["kick", "--reference", "swing.json", "--robot", "./prestoe"]),
+        ("prestoe/prestoe.xml", &["kick", "--reference", "swing.json", "--robot", "./prestoe"]),
+    ] {
+        let folder = workspace();
+        // In the middle of a number or a name.
+        edit(folder.path().join(name), |text| {
+            let middle = text.len() * 3 / 5;
+            let cut = middle + text[middle..].find(|c: char| c.is_alphanumeric()).unwrap() + 1;
+            text[..cut].to_owned()
+        });
+        refused(folder.path(), arguments, &[Path::new(name).file_name().unwrap().to_str().unwrap()]);
+    }
+}
+
+#[test]
+fn a_garbled_file() {
+    for (name, arguments) in
+        [("kick_01.amc", &AMC[..]), ("kick.asf", &AMC[..]), ("kick.bvh", &BVH[..]), ("swing.json", &KICK[..])]
+    {
+        let folder = workspace();
+        std::fs::write(folder.path().join(name), b"\x00\xff\xfeKick me! {[(\x80\n1 2 3\n").unwrap();
+        refused(folder.path(), arguments, &[name, "expected"]);
+    }
+    let folder = workspace();
+    edit(folder.path().join("kick_01.amc"), |text| text.replacen("rfemur ", "rfemur x", 1));
+    refused(folder.path(), &AMC, &["kick_01.amc:", "expected"]);
+}
+
+#[test]
+fn a_skeleton_that_does_not_fit_its_clip() {
+    let folder = workspace();
+    edit(folder.path().join("kick_01.amc"), |text| text.replace("rfemur", "tail"));
+    refused(folder.path(), &AMC, &["kick_01.amc:", "tail", "expected"]);
+    let folder = workspace();
+    edit(folder.path().join("kick.bvh"), |text| text.replace("RightUpLeg", "Tentacle"));
+    refused(folder.path(), &BVH, &["kick.bvh", "right thigh", "rightupleg"]);
+}
+
+#[test]
+fn numbers_that_are_none() {
+    let folder = workspace();
+    edit(folder.path().join("kick_01.amc"), |text| {
+        let line = text.lines().find(|line| line.starts_with("rtibia ")).unwrap().to_owned();
+        text.replacen(&line, "rtibia nan", 1)
+    });
+    refused(folder.path(), &AMC, &["kick_01.amc:", "nan", "expected"]);
+
+    let folder = workspace();
+    edit(folder.path().join("prestoe/prestoe.xml"), |text| text.replacen("mass=\"4.2\"", "mass=\"nan\"", 1));
+    refused(folder.path(), &[&KICK[..], &["--robot", "./prestoe"]].concat(), &["prestoe.xml", "nan"]);
+
+    let folder = workspace();
+    edit(folder.path().join("prestoe/robot.toml"), |text| text.replacen("kp = 400.0", "kp = nan", 1));
+    refused(
+        folder.path(),
+        &[&KICK[..], &["--robot", "./prestoe"]].concat(),
+        &["robot.toml", "group[0].kp", "NaN", "expected"],
+    );
+
+    let folder = workspace();
+    std::fs::write(folder.path().join("world.toml"), "[ball]\nmass = nan\n").unwrap();
+    refused(folder.path(), &[&KICK[..], &["--world", "world.toml"]].concat(), &["world.toml", "ball.mass", "NaN"]);
+
+    let folder = workspace();
+    for (option, value, right) in
+        [("--start", "nan", "from 0 to 0.5"), ("--duration", "nan", "above 0"), ("--ball", "nan,0", "two numbers")]
+    {
+        refused(folder.path(), &[&KICK[..], &[option, value]].concat(), &[right]);
+    }
+    refused(folder.path(), &[&AMC[..], &["--rate", "nan"]].concat(), &["rate", "NaN", "1 to 1000"]);
+}
+
+#[test]
+fn a_robot_file_whose_roles_name_joints_that_do_not_exist() {
+    let folder = workspace();
+    edit(folder.path().join("prestoe/robot.toml"), |text| {
+        text.replace("knee = \"left_knee\"", "knee = \"left_kneee\"")
+    });
+    let words = ["robot.toml", "leg.left.knee", "left_kneee", "the nearest is \"left_knee\""];
+    refused(folder.path(), &[&KICK[..], &["--robot", "./prestoe"]].concat(), &words);
+    refused(folder.path(), &[&AMC[..], &["--robot", "./prestoe"]].concat(), &words);
+    refused(folder.path(), &["robot", "check", "prestoe"], &words);
+}
+
+#[test]
+fn a_model_without_a_free_joint() {
+    let folder = workspace();
+    edit(folder.path().join("prestoe/prestoe.xml"), |text| text.replace("<freejoint name=\"root\"/>", ""));
+    let words = ["prestoe.xml", "no free joint", "<freejoint/>"];
+    refused(folder.path(), &[&KICK[..], &["--robot", "./prestoe"]].concat(), &words);
+    refused(folder.path(), &[&AMC[..], &["--robot", "./prestoe"]].concat(), &words);
+}
+
+#[test]
+fn an_output_folder_that_cannot_be_written() {
+    // Tests may run as root, for whom every folder can be written: a path under a regular file cannot be for anybody.
+    let folder = workspace();
+    std::fs::write(folder.path().join("file"), "").unwrap();
+    let words = ["file", "cannot be written", "expected a folder"];
+    refused(folder.path(), &[&KICK[..], &["--out", "file"]].concat(), &words);
+    refused(folder.path(), &[&KICK[..], &["--out", "file/deeper/out"]].concat(), &words);
+    refused(folder.path(), &[&AMC[..], &["--out", "file/x.json"]].concat(), &words);
+    refused(folder.path(), &[&AMC[..], &["--out", "x.json", "--report", "file/x.html"]].concat(), &words);
+    refused(folder.path(), &[&AMC[..], &["--out", "prestoe"]].concat(), &["prestoe", "is a folder", "expected"]);
+}
+
+#[test]
+fn options_that_do_not_go_together() {
+    let folder = workspace();
+    let folder = folder.path();
+    refused(folder, &["retarget", "--clip", "kick.bvh"], &["kick.bvh", "unit"]);
+    refused(folder, &[&BVH[..], &["--skeleton", "kick.asf"]].concat(), &["kick.asf", "BVH", "expected"]);
+    refused(folder, &[&KICK[..], &["--robot", "nao"]].concat(), &["swing.json", "prestoe", "nao", "retarget"]);
+    refused(folder, &[&KICK[..], &["--start", "9"]].concat(), &["swing.json", "9", "0.5"]);
+    refused(folder, &[&KICK[..], &["--duration", "-1"]].concat(), &["--duration", "-1", "above 0"]);
+    refused(folder, &["kick", "--nonsense"], &["--nonsense"]);
+}

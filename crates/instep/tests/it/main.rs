@@ -1,0 +1,14 @@
+//! Tests through the program itself: what a user types and what comes back.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "clippy.toml allows these in test functions; here the helpers are tests too"
+)]
+
+mod bad_input;
+mod kick;
+mod retarget;
+mod robot;
+mod support;
