@@ -57,7 +57,8 @@ fn main() {
     let number = |i: usize, default: f64| args.get(i).and_then(|a| a.parse().ok()).unwrap_or(default);
     let name = args.get(1).map_or("nao", String::as_str);
     let robot = Arc::new(Robot::load(std::path::Path::new(&format!("robots/{name}"))).unwrap());
-    let settings = DynamicSettings::load(std::path::Path::new(&format!("robots/{name}"))).unwrap();
+    let file = std::env::var("KICK_TOML").unwrap_or(format!("robots/{name}/dynamic.toml"));
+    let settings = DynamicSettings::load(std::path::Path::new(&file)).unwrap();
     let mut engine = DynamicKick::new(Arc::clone(&robot), settings.clone()).unwrap();
     let ball = [number(2, 0.16), number(3, -0.05)];
     let direction = number(4, 0.0).to_radians();
@@ -68,6 +69,10 @@ fn main() {
     let at = [ball[0] - offset[0], ball[1] - offset[1]];
     println!("footprint from base {offset:?}");
     let mut world = WorldSettings::default();
+    let env = |name: &str, default: f64| std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(default);
+    world.step.near_distance = env("NEAR_DISTANCE", 0.02);
+    world.step.near = env("NEAR", 0.00025);
+    world.impact.friction = env("GRIP", 0.5);
     world.ball = Ball { mass: settings.ball.mass, radius: settings.ball.radius };
     let trial = TrialSettings {
         world,

@@ -1,1 +1,23 @@
 //! KickBench: engines x robots x scenarios x seeds to one table.
+//!
+//! - [`scenario`]: data files that say where balls lie, which kicks are asked, and what the world does meanwhile.
+//! - [`engines`]: which engines there are, and what a robot brings to its trials.
+//! - [`cell`]: one engine, robot, scenario and seed, run and measured.
+//! - [`run`]: all cells on all cores, with a file to resume from.
+//! - [`table`] and [`page`]: Markdown, CSV, JSON and HTML.
+//!
+//! One world a thread; but for wall times the same cells give the same results on any number of threads. Engines see
+//! requests and sensors only.
+
+pub mod cell;
+pub mod engines;
+mod error;
+pub mod page;
+pub mod run;
+pub mod scenario;
+pub mod table;
+
+pub use engines::{ENGINES, Subject};
+pub use error::BenchError;
+pub use run::Bench;
+pub use scenario::Scenario;

@@ -61,6 +61,8 @@ pub enum Face {
     Inner,
     /// The side away from it.
     Outer,
+    /// A rounded front corner, the foot turned less than the kick.
+    Corner,
 }
 
 /// How a kick ended or goes on.

@@ -46,7 +46,7 @@ pub struct Weights {
 
 impl Default for Weights {
     fn default() -> Self {
-        Self { position: 100.0, orientation: 30.0, height: 15.0, tilt: 8.0, yaw: 0.8, balance: 60.0, damping: 0.03 }
+        Self { position: 100.0, orientation: 30.0, height: 4.0, tilt: 8.0, yaw: 0.8, balance: 60.0, damping: 0.03 }
     }
 }
 
@@ -165,7 +165,7 @@ impl Ik {
     }
 
     /// Takes at most `steps` steps from `angles` toward `goals` with `swing` as the swing foot; stops when a step is
-    /// under a microradian. `angles` and `pose` agree afterwards.
+    /// under ten microradians. `angles` and `pose` agree afterwards.
     pub fn solve(
         &mut self,
         tree: &Tree,
@@ -188,7 +188,7 @@ impl Ik {
             }
             tree.update(angles, pose);
             residual = self.linearise(tree, pose, swing, goals);
-            if largest < 1e-6 {
+            if largest < 1e-5 {
                 break;
             }
         }
@@ -342,7 +342,10 @@ impl Ik {
     }
 }
 
-/// Rotation vector of a rotation matrix.
-fn log(matrix: &Matrix3<f64>) -> Vector3<f64> {
-    Rotation3::from_matrix_unchecked(*matrix).scaled_axis()
+/// Rotation vector of a rotation matrix that may be off by rounding; by the arc tangent, which needs no clamping.
+fn log(m: &Matrix3<f64>) -> Vector3<f64> {
+    let sine = Vector3::new(m[(2, 1)] - m[(1, 2)], m[(0, 2)] - m[(2, 0)], m[(1, 0)] - m[(0, 1)]) * 0.5;
+    let length = sine.norm();
+    let angle = length.atan2(0.5 * (m.trace() - 1.0));
+    if length < 1e-12 { sine } else { sine * (angle / length) }
 }

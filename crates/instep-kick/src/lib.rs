@@ -4,7 +4,7 @@
 //! - [`engine`]: the trait that every engine implements.
 //! - [`dynamic`]: paper 2's engine: splines of foot and trunk in the support foot's frame, stabilised by the centre of
 //!   pressure.
-//! - [`playback`]: plays a reference from a given instant, open loop.
+//! - [`playback`]: plays a reference from a given instant, open loop; [`feedforward`]: the torques that it needs.
 //! - [`tree`] and [`ik`]: kinematics without MuJoCo, and inverse kinematics with weighted goals under joint limits.
 //!
 //! An engine sees sensors, never the simulator's truth, and allocates nothing in a tick.
@@ -13,6 +13,7 @@ pub mod dialect;
 pub mod dynamic;
 pub mod engine;
 mod error;
+pub mod feedforward;
 pub mod ik;
 pub mod playback;
 pub mod request;

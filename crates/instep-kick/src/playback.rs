@@ -1,4 +1,5 @@
-//! Plays a reference: joint angles, speeds and feed-forward torques as they stand in it, open loop.
+//! Plays a reference: joint angles, speeds and feed-forward torques as they stand in it, open loop. Where it carries no
+//! torques, [`crate::feedforward`] guesses them.
 //!
 //! This is the baseline that every engine is compared with. It balances nothing; what the drives cannot follow is lost.
 //! After the last knot the final pose is held.
@@ -9,7 +10,7 @@ use instep_motion::reference::{Knot, Reference};
 use instep_robot::Robot;
 use instep_robot::control::{Controller, JointCommand, Sensors};
 
-use crate::KickError;
+use crate::{KickError, feedforward};
 
 /// A controller that plays one reference from a given instant.
 #[derive(Debug, Clone)]
@@ -19,6 +20,8 @@ pub struct Playback {
     places: Vec<usize>,
     start: f64,
     knot: Knot,
+    /// Feed-forward torques of each knot in the robot's joint order, N m.
+    torques: Vec<Vec<f64>>,
 }
 
 impl Playback {
@@ -34,7 +37,7 @@ impl Playback {
         if !(0.0..duration).contains(&start) {
             return Err(KickError::Start { start, duration });
         }
-        let places = robot
+        let places: Vec<usize> = robot
             .joints
             .iter()
             .map(|joint| {
@@ -44,9 +47,24 @@ impl Playback {
                 })
             })
             .collect::<Result<_, _>>()?;
+        let torques = if reference.knots.iter().all(|knot| knot.torques.len() == reference.joint_names.len()) {
+            reference.knots.iter().map(|knot| places.iter().map(|&place| knot.torques[place]).collect()).collect()
+        } else {
+            let states: Vec<_> = reference.knots.iter().map(|knot| state(knot, &places)).collect();
+            feedforward::torques(robot, &reference.knots, &states, reference.rate)
+        };
         let mut knot = Knot::default();
         reference.sample_into(start, &mut knot);
-        Ok(Self { reference, places, start, knot })
+        Ok(Self { reference, places, start, knot, torques })
+    }
+
+    /// Feed-forward torque of the robot's joint `joint` at `time` (s, in the reference's time), N m.
+    fn torque(&self, joint: usize, time: f64) -> f64 {
+        let last = self.torques.len() - 1;
+        let at = (time * self.reference.rate).clamp(0.0, last as f64);
+        let below = at.floor() as usize;
+        let (from, to) = (self.torques[below][joint], self.torques[(below + 1).min(last)][joint]);
+        from + (to - from) * at.fract()
     }
 
     /// The state from which the playback starts: q (7 + n) and v (6 + n) in the robot's order.
@@ -54,12 +72,17 @@ impl Playback {
     pub fn initial_state(&self) -> (Vec<f64>, Vec<f64>) {
         let mut knot = Knot::default();
         self.reference.sample_into(self.start, &mut knot);
-        let mut q = [&knot.base_position[..], &knot.base_orientation].concat();
-        let mut v = [&knot.base_velocity[..], &knot.base_angular_velocity].concat();
-        q.extend(self.places.iter().map(|&place| knot.joints[place]));
-        v.extend(self.places.iter().map(|&place| knot.joint_velocities[place]));
-        (q, v)
+        state(&knot, &self.places)
     }
+}
+
+/// q (7 + n) and v (6 + n) of a knot, with the robot's joints at `places` in it.
+fn state(knot: &Knot, places: &[usize]) -> (Vec<f64>, Vec<f64>) {
+    let mut q = [&knot.base_position[..], &knot.base_orientation].concat();
+    let mut v = [&knot.base_velocity[..], &knot.base_angular_velocity].concat();
+    q.extend(places.iter().map(|&place| knot.joints[place]));
+    v.extend(places.iter().map(|&place| knot.joint_velocities[place]));
+    (q, v)
 }
 
 impl Controller for Playback {
@@ -70,7 +93,7 @@ impl Controller for Playback {
         for (i, &place) in self.places.iter().enumerate() {
             command.positions[i] = self.knot.joints[place];
             command.velocities[i] = if over { 0.0 } else { self.knot.joint_velocities[place] };
-            command.torques[i] = if over { 0.0 } else { self.knot.torques.get(place).copied().unwrap_or(0.0) };
+            command.torques[i] = self.torque(i, time);
         }
     }
 }

@@ -148,10 +148,12 @@ pub enum Refusal {
         gap: f64,
     },
     /// On the way two parts of the robot would touch.
-    #[error("with the {foot} foot two parts of the robot come within {gap:.3} m of each other")]
+    #[error("with the {foot} foot two parts of the robot come within {gap:.3} m of each other (pair {pair})")]
     SelfCollision {
         /// The foot.
         foot: Side,
+        /// Which pair, as an index into the robot's self-collision pairs.
+        pair: usize,
         /// Smallest gap, m; negative is an overlap.
         gap: f64,
     },

@@ -193,15 +193,15 @@ impl Tree {
         if self.moves[joint][link] { pose.axis[joint] } else { Vector3::zeros() }
     }
 
-    /// The smallest gap between the surfaces of the pairs that must not touch, m; infinite when there are none.
+    /// The smallest gap between the surfaces of the pairs that must not touch, m, and which pair of the robot's
+    /// self-collision list has it; infinite when there are none.
     #[must_use]
-    pub fn least_gap(&self, pose: &TreePose) -> f64 {
+    pub fn least_gap(&self, pose: &TreePose) -> (f64, usize) {
         self.pairs
             .iter()
-            .map(|[a, b]| {
-                closest_points(pose.axis_of(a), pose.axis_of(b)).distance() - a.radius - b.radius
-            })
-            .fold(f64::INFINITY, f64::min)
+            .map(|[a, b]| closest_points(pose.axis_of(a), pose.axis_of(b)).distance() - a.radius - b.radius)
+            .enumerate()
+            .fold((f64::INFINITY, 0), |least, (pair, gap)| if gap < least.0 { (gap, pair) } else { least })
     }
 }
 

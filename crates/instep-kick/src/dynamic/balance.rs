@@ -52,14 +52,15 @@ pub(crate) struct Balance {
     settings: Feedback,
     x: PidState,
     y: PidState,
-    filtered: Option<[f64; 2]>,
+    /// First and second stage of the low-pass on the output.
+    first: [f64; 2],
     shift: [f64; 2],
 }
 
 impl Balance {
     pub(crate) fn new(settings: Feedback) -> Self {
         let (x, y) = (PidState::new(settings.x), PidState::new(settings.y));
-        Self { settings, x, y, filtered: None, shift: [0.0; 2] }
+        Self { settings, x, y, first: [0.0; 2], shift: [0.0; 2] }
     }
 
     /// Shift of the centre of mass, m, from the measured and the planned centre of pressure in the support sole's frame.
@@ -67,24 +68,22 @@ impl Balance {
         if !self.settings.on {
             return [0.0; 2];
         }
-        let measured = measured.filter(|m| m.iter().chain(&planned).all(|v| v.is_finite()));
-        let Some(measured) = measured.filter(|_| active) else {
-            self.filtered = None;
-            // The shift must not jump: it fades within about a third of a second.
-            let share = (1.0 - 3.0 * dt).max(0.0);
-            self.x.fade(share);
-            self.y.fade(share);
-            self.shift = self.shift.map(|s| s * share);
-            return self.shift;
+        let measured = measured.filter(|m| active && m.iter().chain(&planned).all(|v| v.is_finite()));
+        let wanted = match measured {
+            Some(measured) => [-self.x.step(measured[0] - planned[0], dt), -self.y.step(measured[1] - planned[1], dt)],
+            // Nothing to control: the integral fades within about a third of a second.
+            None => {
+                let share = (1.0 - 3.0 * dt).max(0.0);
+                [-self.x.fade(share), -self.y.fade(share)]
+            }
         };
-        let error = [0, 1].map(|k| measured[k] - planned[k]);
+        // To move the centre of mass one way, the centre of pressure must first go the other way by (h / g) times the
+        // acceleration: without two poles here the loop would shake itself.
         let share = dt / (self.settings.filter + dt);
-        let filtered = match self.filtered {
-            Some(old) => [0, 1].map(|k| old[k] + share * (error[k] - old[k])),
-            None => [error[0] * share, error[1] * share],
-        };
-        self.filtered = Some(filtered);
-        self.shift = [-self.x.step(filtered[0], dt), -self.y.step(filtered[1], dt)];
+        for k in 0..2 {
+            self.first[k] += share * (wanted[k] - self.first[k]);
+            self.shift[k] += share * (self.first[k] - self.shift[k]);
+        }
         self.shift
     }
 

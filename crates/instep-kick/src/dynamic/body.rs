@@ -1,11 +1,13 @@
 //! One robot as the dynamic engine knows it: its tree, its feet and its stand, seen from either support foot.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use instep_motion::phase::Side;
 use instep_robot::Robot;
 use nalgebra::{Rotation3, Vector3};
 
+use crate::KickError;
 use crate::dynamic::foot::Foot;
 use crate::ik::Goals;
 use crate::tree::Tree;
@@ -49,6 +51,8 @@ pub(crate) struct Body {
     pub(crate) stands: [Stand; 2],
     /// Standing joint angles, rad.
     pub(crate) angles: Vec<f64>,
+    /// Joints that leave the stand while the foot is up: index, standing angle, angle then.
+    pub(crate) arms: Vec<(usize, f64, f64)>,
     /// Half the distance between the soles' centres, m.
     pub(crate) half_width: f64,
     /// Length of the straight leg from hip to sole, m.
@@ -56,7 +60,7 @@ pub(crate) struct Body {
 }
 
 impl Body {
-    pub(crate) fn new(robot: Arc<Robot>) -> Self {
+    pub(crate) fn new(robot: Arc<Robot>, wanted: &BTreeMap<String, f64>) -> Result<Self, KickError> {
         let tree = Tree::new(&robot);
         let mut pose = tree.pose();
         let angles = robot.stand[7..].to_vec();
@@ -81,7 +85,33 @@ impl Body {
         let leg = &robot.legs[0];
         let length = |a: usize, b: usize| (pose.position[a] - pose.position[b]).norm();
         let leg_length = length(leg.thigh, leg.shank) + length(leg.shank, leg.foot) - leg.sole.point.z.min(0.0);
-        Self { robot, tree, feet, stands, angles, half_width, leg_length }
+        let arms = wanted
+            .iter()
+            .map(|(name, &angle)| {
+                let wrong = |expected: String| KickError::Setting {
+                    field: format!("arms.{name}"),
+                    found: angle.to_string(),
+                    expected,
+                };
+                let joint = robot
+                    .joint_index(name)
+                    .filter(|j| !robot.legs.iter().any(|leg| leg.joints().any(|of_leg| of_leg == *j)))
+                    .ok_or_else(|| wrong(format!("a joint of {} that is no leg's", robot.name)))?;
+                let [low, high] = robot.joints[joint].range;
+                if !(low..=high).contains(&angle) {
+                    return Err(wrong(format!("an angle in [{low}, {high}] rad")));
+                }
+                Ok((joint, angles[joint], angle))
+            })
+            .collect::<Result<_, _>>()?;
+        Ok(Self { robot, tree, feet, stands, angles, arms, half_width, leg_length })
+    }
+
+    /// Sets the joints that are no leg's: `share` 0 is the stand, 1 the foot up.
+    pub(crate) fn set_arms(&self, share: f64, angles: &mut [f64]) {
+        for (joint, stand, up) in &self.arms {
+            angles[*joint] = stand + share * (up - stand);
+        }
     }
 
     /// The stand as seen from the support foot of a kick with `swing`.

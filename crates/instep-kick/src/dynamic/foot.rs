@@ -93,10 +93,22 @@ impl Foot {
         }
     }
 
-    /// A face.
+    /// A face; `turn` (rad) is the kick's direction from the foot's x axis and says which corner.
     #[must_use]
-    pub fn face(&self, face: Face) -> &FacePoint {
-        &self.faces[face as usize]
+    pub fn face(&self, face: Face, turn: f64) -> FacePoint {
+        let front = self.faces[0];
+        match face {
+            Face::Front => front,
+            Face::Inner => self.faces[1],
+            Face::Outer => self.faces[2],
+            // The end of the front capsule is a sphere: it strikes in every direction between front and side.
+            Face::Corner => FacePoint {
+                axis: front.axis + Vector3::y() * front.half_width.copysign(turn),
+                angle: turn,
+                half_width: 0.0,
+                ..front
+            },
+        }
     }
 }
 

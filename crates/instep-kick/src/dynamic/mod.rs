@@ -58,6 +58,9 @@ pub struct DynamicKick {
     pose: TreePose,
     now: TreePose,
     angles: Vec<f64>,
+    /// The stabilised pose and angles of the middle sample, which are commanded.
+    held: TreePose,
+    held_angles: Vec<f64>,
     motion: Motion,
     stroke: Option<Stroke>,
     request: Option<KickRequest>,
@@ -82,7 +85,7 @@ impl DynamicKick {
             .iter()
             .filter_map(|[a, b]| Some([robot.joint_index(a)?, robot.joint_index(b)?]))
             .collect();
-        let body = Body::new(Arc::clone(&robot));
+        let body = Body::new(Arc::clone(&robot), &settings.arms)?;
         let planner = Planner::new(&body, &settings, ik.clone(), Dynamics::new(&robot, coupled.clone()));
         let motion = Motion::standing(&body, Side::Right);
         let mut pose = body.tree.pose();
@@ -97,7 +100,9 @@ impl DynamicKick {
             dynamics,
             balance,
             now: pose.clone(),
+            held: pose.clone(),
             pose,
+            held_angles: angles.clone(),
             angles,
             motion,
             stroke: None,
@@ -229,15 +234,21 @@ impl Controller for DynamicKick {
         let both = self.motion.both_feet(self.clock);
         let measured = self.measured(sensors);
         let shift = self.balance.shift(measured, self.planned_cop, self.running(), dt);
-        let mut goals = self.motion.goals(self.clock + ahead);
-        goals.balance[0] += shift[0];
-        goals.balance[1] += shift[1];
+        // The plan, without feedback: its differences give speeds and torques that feedback must not shake.
+        let goals = self.motion.goals(self.clock + ahead);
+        self.body.set_arms(self.motion.arms(self.clock + ahead), &mut self.angles);
         self.ik.solve(&self.body.tree, &mut self.pose, &mut self.angles, swing, &goals, TICK_STEPS);
         self.dynamics.push(&self.body, swing.other(), &self.angles, &self.pose);
         self.body.tree.update(self.dynamics.angles(), &mut self.now);
         self.planned_cop = self.dynamics.solve(&self.body, swing, &self.now, dt, both);
 
-        command.positions.copy_from_slice(self.dynamics.angles());
+        // The plan of the middle sample, shifted by the closed loop.
+        let mut goals = self.motion.goals(self.clock + 0.5 * dt);
+        self.body.set_arms(self.motion.arms(self.clock + 0.5 * dt), &mut self.held_angles);
+        goals.balance[0] += shift[0];
+        goals.balance[1] += shift[1];
+        self.ik.solve(&self.body.tree, &mut self.held, &mut self.held_angles, swing, &goals, TICK_STEPS);
+        command.positions.copy_from_slice(&self.held_angles);
         command.velocities.copy_from_slice(self.dynamics.speeds());
         command.torques.copy_from_slice(&self.dynamics.torques);
         // A moment on the body is the opposite of one on the foot, which is what the ankle's torque turns.
@@ -284,6 +295,7 @@ impl KickEngine for DynamicKick {
         self.angles.copy_from_slice(&self.body.angles);
         self.body.tree.update(&self.angles, &mut self.now);
         self.pose.clone_from(&self.now);
+        self.held_angles.copy_from_slice(&self.body.angles);
         self.dynamics.fill(&self.body, planned.stroke.swing.other(), &self.angles, &self.now);
         self.planned_cop =
             self.dynamics.solve(&self.body, planned.stroke.swing, &self.now, self.settings.control_period, true);

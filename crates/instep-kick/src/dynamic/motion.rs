@@ -53,21 +53,21 @@ pub(crate) struct Motion {
     pub(crate) swing: Side,
     /// Sole's x, y, z, yaw, pitch.
     foot: Path<5>,
-    /// Centre of mass x, y; base height, roll, pitch, yaw.
-    trunk: Path<6>,
+    /// Centre of mass x, y; base height, roll, pitch, yaw; share of the arms' way.
+    trunk: Path<7>,
     /// Ends of the phases from [`Phase::Shift`] to [`Phase::ShiftBack`].
     ends: [f64; 7],
     pub(crate) contact: Option<f64>,
 }
 
-fn trunk_stand(body: &Body, swing: Side) -> [f64; 6] {
+fn trunk_stand(body: &Body, swing: Side) -> [f64; 7] {
     let stand = body.stand(swing);
     let [roll, pitch, yaw] = stand.base;
-    [stand.com.x, stand.com.y, stand.height, roll, pitch, yaw]
+    [stand.com.x, stand.com.y, stand.height, roll, pitch, yaw, 0.0]
 }
 
 /// The trunk over the support foot, with the base's share of the foot's `yaw`.
-pub(crate) fn trunk_support(body: &Body, settings: &DynamicSettings, swing: Side, yaw: f64) -> [f64; 6] {
+pub(crate) fn trunk_support(body: &Body, settings: &DynamicSettings, swing: Side, yaw: f64) -> [f64; 7] {
     let stand = body.stand(swing);
     let (s, sign) = (&settings.stance, Body::sign(swing));
     let [roll, pitch, base_yaw] = stand.base;
@@ -78,11 +78,12 @@ pub(crate) fn trunk_support(body: &Body, settings: &DynamicSettings, swing: Side
         roll + sign * s.roll,
         pitch + s.pitch,
         base_yaw + settings.swing.base_yaw * yaw,
+        1.0,
     ]
 }
 
 /// Goals from the two parts.
-pub(crate) fn goals(foot: &[f64; 5], trunk: &[f64; 6]) -> Goals {
+pub(crate) fn goals(foot: &[f64; 5], trunk: &[f64; 7]) -> Goals {
     Goals {
         position: Vector3::new(foot[0], foot[1], foot[2]),
         yaw_pitch: [foot[3], foot[4]],
@@ -223,6 +224,11 @@ impl Motion {
     /// Where the engine wants everything at `time`.
     pub(crate) fn goals(&self, time: f64) -> Goals {
         goals(&self.foot.at(time).position, &self.trunk.at(time).position)
+    }
+
+    /// Share of the arms' way at `time`.
+    pub(crate) fn arms(&self, time: f64) -> f64 {
+        self.trunk.at(time).position[6]
     }
 
     /// End, s.

@@ -22,12 +22,15 @@ use crate::request::{KickRequest, Place, Refusal, Strength};
 use crate::tree::TreePose;
 
 /// Steps of inverse kinematics to a place that is far from the last.
-const FAR: usize = 10;
+const FAR: usize = 8;
 /// The same to a place near the last.
 const NEAR: usize = 3;
 /// Sampling of the forecast, s: in the kick, and elsewhere.
 const FINE: f64 = 0.012;
 const COARSE: f64 = 0.04;
+
+/// Least and greatest angle from the foot's x axis at which a corner strikes, rad.
+const CORNER: [f64; 2] = [0.0, 1.3];
 
 /// What a candidate looks like at its three places.
 #[derive(Debug, Clone, Copy)]
@@ -81,6 +84,7 @@ impl Planner {
         };
         for swing in [Side::Left, Side::Right] {
             planner.angles.copy_from_slice(&body.angles);
+            body.set_arms(1.0, &mut planner.angles);
             let home = body.stand(swing).home;
             let foot = [home.x, home.y, settings.swing.lift, 0.0, 0.0];
             let goals = goals(&foot, &trunk_support(body, settings, swing, 0.0));
@@ -135,17 +139,28 @@ impl Planner {
     ) -> Result<Planned, Refusal> {
         let (ball, velocity) = roll(request.ball, request.ball_velocity, settings.ball.deceleration, time);
         check_place(body, settings, ball)?;
-        let mut candidates: [Option<Candidate>; 6] = [None; 6];
+        let mut candidates: [Option<Candidate>; 12] = [None; 12];
         let mut refusal: Option<Refusal> = None;
         let mut count = 0;
         for swing in [Side::Left, Side::Right] {
             if request.foot.is_some_and(|foot| foot != swing) {
                 continue;
             }
-            for face in [Face::Front, Face::Inner, Face::Outer] {
-                match self.screen(body, settings, request, ball, velocity, swing, face) {
+            // Front and sides with the foot turned as the face needs; the corners with the foot turned half or not.
+            for (face, turn) in [
+                (Face::Front, 1.0),
+                (Face::Inner, 1.0),
+                (Face::Outer, 1.0),
+                (Face::Corner, 1.0),
+                (Face::Corner, 0.5),
+                (Face::Corner, 0.0),
+            ] {
+                match self.screen(body, settings, request, (ball, velocity), swing, (face, turn)) {
                     Some(Ok(candidate)) => candidates[count] = Some(candidate),
-                    Some(Err(cause)) => refusal = Some(graver(refusal, cause)),
+                    Some(Err(cause)) => {
+                        if std::env::var("KICK_DEBUG").is_ok() { eprintln!("{swing} {face:?}: {cause}"); }
+                        refusal = Some(graver(refusal, cause));
+                    }
                     None => {}
                 }
                 count += 1;
@@ -172,7 +187,10 @@ impl Planner {
                     };
                     return Ok(Planned { motion, stroke: candidate.stroke, plan });
                 }
-                Err(cause) => refusal = Some(graver(refusal, cause)),
+                Err(cause) => {
+                        if std::env::var("KICK_DEBUG").is_ok() { eprintln!("forecast {:?}: {cause}", candidate.stroke); }
+                    refusal = Some(graver(refusal, cause))
+                },
             }
         }
         Err(refusal.unwrap_or(Refusal::Unreachable { foot: Side::Right, place: Place::Contact, gap: f64::INFINITY }))
@@ -184,13 +202,11 @@ impl Planner {
         body: &Body,
         settings: &DynamicSettings,
         request: &KickRequest,
-        ball: [f64; 2],
-        velocity: [f64; 2],
+        (ball, velocity): ([f64; 2], [f64; 2]),
         swing: Side,
-        face: Face,
+        (face, turn): (Face, f64),
     ) -> Option<Result<Candidate, Refusal>> {
         let s = &settings.swing;
-        let point = *body.feet[swing as usize].face(face);
         // A moving ball keeps its speed: the impulse must point from it to the wanted velocity.
         let ball_velocity = Vector2::from(velocity);
         let wanted_speed = |mass: f64| match request.strength {
@@ -200,8 +216,18 @@ impl Planner {
         };
         let aim = Vector2::new(request.direction.cos(), request.direction.sin()) * wanted_speed(1.0) - ball_velocity;
         let direction = if ball_velocity.norm() > 0.02 { aim.y.atan2(aim.x) } else { request.direction };
-        let yaw = wrap(direction - point.angle);
-        if yaw.abs() > s.yaw {
+        let (point, yaw) = if face == Face::Corner {
+            let yaw = turn * direction;
+            let turned = wrap(direction - yaw);
+            // With the foot turned all the way both corners will do; the inner one reaches farther across.
+            let corner = if turned.abs() < 1e-9 { -1e-9 * Body::sign(swing) } else { turned };
+            (body.feet[swing as usize].face(face, corner), yaw)
+        } else {
+            let point = body.feet[swing as usize].face(face, 0.0);
+            (point, wrap(direction - point.angle))
+        };
+        let corner_range = (CORNER[0]..=CORNER[1]).contains(&point.angle.abs());
+        if yaw.abs() > s.yaw || (face == Face::Corner && !corner_range) {
             return None;
         }
         let height = (settings.ball.radius + s.height - point.axis.z).max(s.sole_least);
@@ -251,7 +277,7 @@ impl Planner {
 
         // The longest wind-up and follow-through there is room for.
         let mut failure = None;
-        let shares = [1.0, 0.7, 0.45, 0.0];
+        let shares = [1.0, 0.5, 0.0];
         let fits = shares.into_iter().find_map(|share| {
             stroke.windup = s.windup_least + share * (s.windup - s.windup_least);
             self.angles.copy_from_slice(&self.saved);
@@ -273,7 +299,11 @@ impl Planner {
         let paper = paper_choice(request.ball, request.direction, s.corridor);
         let mut cost = share.0 / settings.limits.speed;
         cost += 0.8 * (1.0 - stroke.windup / s.windup) + 0.3 * (1.0 - stroke.follow / s.follow);
-        cost += 0.4 * yaw.abs() / FRAC_PI_4 + if face == Face::Front { 0.0 } else { 0.3 };
+        cost += 0.4 * yaw.abs() / FRAC_PI_4 + match face {
+            Face::Front => 0.0,
+            Face::Inner | Face::Outer => 0.3,
+            Face::Corner => 0.5,
+        };
         cost += 0.3 * (1.0 - limit / 0.1).clamp(0.0, 1.0);
         cost -= if paper == swing { 0.15 } else { 0.0 };
         cost -= if paper_face(swing, request.direction) == face { 0.15 } else { 0.0 };
@@ -300,9 +330,9 @@ impl Planner {
         if !matches!(gap.partial_cmp(&settings.limits.reach), Some(o) if o.is_le()) {
             return Err(Refusal::Unreachable { foot: stroke.swing, place: what, gap });
         }
-        let gap = body.tree.least_gap(&self.pose);
+        let (gap, pair) = body.tree.least_gap(&self.pose);
         if gap < settings.limits.clearance {
-            return Err(Refusal::SelfCollision { foot: stroke.swing, gap });
+            return Err(Refusal::SelfCollision { foot: stroke.swing, pair, gap });
         }
         Ok(())
     }
@@ -343,9 +373,9 @@ impl Planner {
             if !matches!(gap.partial_cmp(&limits.reach), Some(o) if o.is_le()) {
                 return Err(Refusal::Unreachable { foot: swing, place: Place::Way, gap });
             }
-            let gap = body.tree.least_gap(&self.pose);
+            let (gap, pair) = body.tree.least_gap(&self.pose);
             if gap < limits.clearance {
-                return Err(Refusal::SelfCollision { foot: swing, gap });
+                return Err(Refusal::SelfCollision { foot: swing, pair, gap });
             }
             let quick = (fast[0]..fast[1]).contains(&time);
             if quick {

@@ -1,6 +1,7 @@
 //! The numbers of the dynamic engine for one robot: `robots/<name>/dynamic.toml`. Each field says its meaning, unit,
 //! range and effect; a file with an unknown field is refused, and so is a value that cannot be, with its path.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
@@ -24,6 +25,10 @@ pub struct DynamicSettings {
     pub times: Times,
     /// Where body and centre of mass go.
     pub stance: Stance,
+    /// Joint angles (rad) that arms and head take while the foot is up, so that they are out of the legs' way; joints
+    /// not named keep their standing angle. No joint of a leg.
+    #[serde(default)]
+    pub arms: BTreeMap<String, f64>,
     /// What counts as possible.
     pub limits: Limits,
     /// Stated accuracy.
@@ -146,7 +151,7 @@ pub struct Feedback {
     pub x: Pid,
     /// The same to the left.
     pub y: Pid,
-    /// Time constant of the low-pass on the centre of pressure, s.
+    /// Time constant of each of the two stages of the low-pass on the shift, s. Above sqrt(p h / g), or the loop shakes.
     pub filter: f64,
     /// Ankle moment against the base's tilt, in units of m g h a radian; h is the centre of mass's height.
     pub tilt: f64,

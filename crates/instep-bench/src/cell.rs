@@ -1,0 +1,207 @@
+//! One cell of the benchmark: one engine, robot, scenario and seed; every case planned, tried and measured.
+//!
+//! The engine sees the request and the sensors; the world and its truth stay here. Wall time is measured here too and
+//! is the only thing in a result that differs from run to run.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use instep_kick::{KickEngine, Refusal};
+use instep_robot::control::{Controller, JointCommand, Sensors};
+use instep_sim::sensors::SensorSuite;
+use instep_sim::trial::{Disturbance, Trial, TrialSettings, run_disturbed};
+use instep_sim::{BallState, World};
+use serde::{Deserialize, Serialize};
+
+use crate::BenchError;
+use crate::engines::Subject;
+use crate::scenario::{Case, Scenario};
+
+/// Time after the planned end in which the robot must stand, s.
+const AFTER: f64 = 0.8;
+/// A ball that leaves slower than this share of the asked speed was not hit.
+const HIT: f64 = 0.3;
+
+/// Which cell.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct CellKey {
+    /// Engine.
+    pub engine: String,
+    /// Robot.
+    pub robot: String,
+    /// Scenario.
+    pub scenario: String,
+    /// Seed.
+    pub seed: u64,
+    /// Number of requests.
+    pub requests: usize,
+}
+
+/// What came of one accepted request.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Kicked {
+    /// Whether the ball was hit.
+    pub hit: bool,
+    /// Whether the robot stood to the end.
+    pub upright: bool,
+    /// Speed of the ball, m/s; only when the audit believes it.
+    pub ball_speed: Option<f64>,
+    /// Speed asked, m/s.
+    pub asked_speed: f64,
+    /// Signed direction error, rad.
+    pub direction_error: Option<f64>,
+    /// How far the ball rolls from its place, m: as simulated, and from the last speed on by the rolling deceleration.
+    pub distance: f64,
+    /// From the plan to the contact, s.
+    pub contact: Option<f64>,
+    /// Whether the impact failed the audit.
+    pub audit_invalid: bool,
+    /// Joints beyond their limits.
+    pub violations: usize,
+}
+
+/// All results of a cell.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CellResult {
+    /// Which cell.
+    pub key: CellKey,
+    /// For each case, in order: what came of it, or the refusal's name.
+    pub outcomes: Vec<Result<Kicked, String>>,
+    /// Time of each plan, s.
+    pub plan_times: Vec<f64>,
+    /// Median and 99th percentile of the ticks' times, s.
+    pub tick_times: [f64; 2],
+}
+
+/// Measures the ticks of an engine.
+struct Timed<'a> {
+    engine: &'a mut dyn KickEngine,
+    times: &'a mut Vec<f32>,
+}
+
+impl Controller for Timed<'_> {
+    fn tick(&mut self, sensors: &Sensors, command: &mut JointCommand) {
+        let start = Instant::now();
+        self.engine.tick(sensors, command);
+        self.times.push(start.elapsed().as_secs_f32());
+    }
+}
+
+/// Runs one cell.
+///
+/// # Errors
+/// When the world cannot be built or the simulation diverges.
+pub fn run_cell(subject: &Subject, scenario: &Scenario, key: &CellKey) -> Result<CellResult, BenchError> {
+    let mut ticks = Vec::new();
+    let mut plan_times = Vec::with_capacity(key.requests);
+    let mut outcomes = Vec::with_capacity(key.requests);
+    let mut shared: Option<World> = None;
+    for case in scenario.cases(&subject.size, key.seed, key.requests) {
+        let mut engine = subject.engine(&key.engine)?;
+        let world = match &mut shared {
+            Some(world) if !scenario.varies_world() => world,
+            slot => slot.insert(world(subject, scenario, &case)?),
+        };
+        let (outcome, plan_time, _) = run_case(subject, scenario, &case, engine.as_mut(), world, &mut ticks)?;
+        plan_times.push(plan_time);
+        outcomes.push(outcome.map_err(|refusal| refusal.name().to_owned()));
+    }
+    ticks.sort_by(f32::total_cmp);
+    let at = |share: f64| ticks.get(((ticks.len() as f64 * share) as usize).min(ticks.len().max(1) - 1));
+    let tick_times = [0.5, 0.99].map(|share| at(share).map_or(0.0, |t| f64::from(*t)));
+    Ok(CellResult { key: key.clone(), outcomes, plan_times, tick_times })
+}
+
+/// The world of a case.
+///
+/// # Errors
+/// When its constants cannot be.
+pub fn world(subject: &Subject, scenario: &Scenario, case: &Case) -> Result<World, BenchError> {
+    let mut settings = subject.world();
+    settings.sensors = scenario.sensors;
+    settings.model_error = case.model;
+    let [friction, softness] = case.pitch;
+    settings.pitch.friction = friction.unwrap_or(settings.pitch.friction);
+    settings.pitch.softness = softness.unwrap_or(settings.pitch.softness);
+    Ok(World::new(Arc::clone(&subject.robot), &settings)?)
+}
+
+/// Plans and tries one case. Gives the outcome, the time of the plan (s) and the trial of an accepted request.
+///
+/// # Errors
+/// When the simulation diverges.
+pub fn run_case(
+    subject: &Subject,
+    scenario: &Scenario,
+    case: &Case,
+    engine: &mut dyn KickEngine,
+    world: &mut World,
+    ticks: &mut Vec<f32>,
+) -> Result<(Result<Kicked, Refusal>, f64, Option<Trial>), BenchError> {
+    let robot = &subject.robot;
+    let on_ground = |[x, y]: [f64; 2]| [x + subject.footprint[0], y + subject.footprint[1], subject.size.ball];
+    let mut ball = BallState::at_rest(on_ground(case.ball));
+    let [vx, vy] = case.ball_velocity;
+    ball.velocity = [vx, vy, 0.0];
+    ball.angular_velocity = [-vy / subject.size.ball, vx / subject.size.ball, 0.0];
+    let still = vec![0.0; robot.nv()];
+    world.reset(&robot.stand, &still, &ball)?;
+    let mut suite = SensorSuite::new(world, case.seed);
+    suite.sense(world);
+    let mut sensors = Sensors::default();
+    suite.read_into(0.0, &mut sensors);
+
+    let start = Instant::now();
+    let planned = engine.plan(&case.request, &sensors);
+    let plan_time = start.elapsed().as_secs_f64();
+    let plan = match planned {
+        Ok(plan) => plan,
+        Err(refusal) => return Ok((Err(refusal), plan_time, None)),
+    };
+    let mut disturbances = Vec::new();
+    if let Some((before, duration, change)) = case.push {
+        let share = robot.mass() / duration;
+        let force = [change[0] * share, change[1] * share, 0.0];
+        disturbances.push(Disturbance::Push { time: (plan.contact - before).max(0.01), duration, force });
+    }
+    if let Some((before, by)) = case.ball_moved {
+        let place = [case.ball[0] + by[0], case.ball[1] + by[1]];
+        let ball = BallState::at_rest(on_ground(place));
+        disturbances.push(Disturbance::MoveBall { time: (plan.contact - before).max(0.01), ball });
+    }
+    let settings = TrialSettings {
+        world: *world.settings(),
+        seed: case.seed,
+        duration: plan.duration + AFTER,
+        control_period: engine.control_period(),
+        q: robot.stand.clone(),
+        v: still,
+        ball,
+        direction: case.request.direction,
+    };
+    let mut timed = Timed { engine, times: ticks };
+    let trial = run_disturbed(world, &settings, &disturbances, &mut timed)?;
+    let kicked = judge(subject, scenario, case, &trial);
+    Ok((Ok(kicked), plan_time, Some(trial)))
+}
+
+fn judge(subject: &Subject, _scenario: &Scenario, case: &Case, trial: &Trial) -> Kicked {
+    let asked_speed = case.request.strength.value();
+    let invalid = trial.impact.is_some() && !trial.audit.faults.is_empty();
+    let impact = trial.impact.as_ref();
+    let hit = impact.is_some_and(|impact| impact.ball_speed() > HIT * asked_speed);
+    let first = trial.record.ball.first().map_or([0.0; 3], |ball| ball.position);
+    let last_speed = trial.record.ball.last().map_or(0.0, |ball| ball.velocity[0].hypot(ball.velocity[1]));
+    let rolled = (trial.ball_end[0] - first[0]).hypot(trial.ball_end[1] - first[1]);
+    Kicked {
+        hit,
+        upright: trial.upright(),
+        ball_speed: impact.filter(|_| !invalid).map(|impact| impact.ball_speed()),
+        asked_speed,
+        direction_error: trial.direction_error.filter(|_| hit),
+        distance: rolled + last_speed * last_speed / (2.0 * subject.size.deceleration),
+        contact: impact.map(|impact| impact.time),
+        audit_invalid: invalid,
+        violations: trial.limit_violations.len(),
+    }
+}

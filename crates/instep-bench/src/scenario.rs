@@ -1,0 +1,287 @@
+//! A scenario: a data file that says where balls lie, which kicks are asked, and what the world does to the robot.
+//!
+//! Lengths that depend on the robot's size are shares of its leg length or of half the distance of its soles, so that
+//! one file serves all robots. Every pair of numbers is a range that is drawn from evenly. The draws come from one
+//! seeded generator, in a fixed order: same file, robot and seed, same cases.
+
+use std::path::Path;
+
+use instep_kick::{KickRequest, Strength};
+use instep_sim::settings::{ModelError, SensorNoise};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
+
+use crate::BenchError;
+
+/// A range, both ends possible; `[a, a]` is the number a.
+pub type Range = [f64; 2];
+
+/// A whole scenario file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Scenario {
+    /// Short name, used in tables; the file's stem.
+    pub name: String,
+    /// One line for people.
+    pub title: String,
+    /// Where the ball lies.
+    pub ball: BallPlace,
+    /// Which kick is asked.
+    pub kick: Kick,
+    /// Noise and delay of sensors; the ball's noise is also in the request.
+    #[serde(default)]
+    pub sensors: SensorNoise,
+    /// The ground, where it is not the default.
+    #[serde(default)]
+    pub pitch: PitchRange,
+    /// How the robot differs from its model.
+    #[serde(default)]
+    pub model: ModelRange,
+    /// What happens during the kick.
+    #[serde(default)]
+    pub disturbance: DisturbanceRange,
+}
+
+/// Where the ball lies. Either side of the robot, with equal chance.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BallPlace {
+    /// Gap between the toes' line and the ball's surface, share of the leg length.
+    pub gap: Range,
+    /// Distance of the ball's centre from the middle line, share of half the distance of the soles; below zero is on
+    /// the other side.
+    pub lateral: Range,
+}
+
+/// Which kick is asked.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Kick {
+    /// Direction, degrees; positive is toward the middle line and beyond, as seen from the ball's side.
+    pub direction_deg: Range,
+    /// Speed of the ball as it leaves, m/s.
+    pub speed: Range,
+}
+
+/// The ground; ranges of the fields of `instep_sim::settings::Pitch`.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct PitchRange {
+    /// Friction between sole and ground.
+    pub friction: Option<Range>,
+    /// Time constant of the ground, s.
+    pub softness: Option<Range>,
+}
+
+/// How the robot differs from its model; ranges of the fields of `instep_sim::settings::ModelError`.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ModelRange {
+    /// Factor on all masses.
+    pub mass: Option<Range>,
+    /// Shift of the base link's centre of mass forward, share of the leg length.
+    pub base_forward: Option<Range>,
+    /// Dry friction of joints, share of the torque limit.
+    pub joint_friction: Option<Range>,
+}
+
+/// What happens during the kick.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct DisturbanceRange {
+    /// A push on the base from any side, in m/s that it would give the whole robot.
+    pub push: Option<Range>,
+    /// When the push starts, s before the contact.
+    pub push_before: Option<Range>,
+    /// How long it lasts, s; 0.05 when absent.
+    pub push_duration: Option<f64>,
+    /// How far the ball is moved in any direction, share of the leg length.
+    pub ball_moved: Option<Range>,
+    /// When the ball is moved, s before the contact.
+    pub ball_moved_before: Option<Range>,
+    /// Speed of a ball that rolls toward the place where it is to be kicked, m/s.
+    pub rolling: Option<Range>,
+    /// Where it comes from, degrees from the kick's direction reversed; 0 comes straight at the foot.
+    pub rolling_from_deg: Option<Range>,
+}
+
+/// What a scenario needs to know of a robot.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Size {
+    /// Hip to sole with a straight leg, m.
+    pub leg: f64,
+    /// Half the distance between the soles, m.
+    pub half_width: f64,
+    /// From the footprint to the toes' line, m.
+    pub toes: f64,
+    /// Ball's radius, m.
+    pub ball: f64,
+    /// Deceleration of the rolling ball, m/s^2.
+    pub deceleration: f64,
+}
+
+/// One case, drawn from a scenario.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Case {
+    /// What the engine is told.
+    pub request: KickRequest,
+    /// Where the ball is at the start, footprint frame, m.
+    pub ball: [f64; 2],
+    /// How it moves then, m/s.
+    pub ball_velocity: [f64; 2],
+    /// Ground friction and softness.
+    pub pitch: [Option<f64>; 2],
+    /// How the robot differs.
+    pub model: ModelError,
+    /// Push: seconds before contact, duration, velocity change (m/s, footprint frame).
+    pub push: Option<(f64, f64, [f64; 2])>,
+    /// The ball is moved: seconds before contact, by how much, m.
+    pub ball_moved: Option<(f64, [f64; 2])>,
+    /// Seed of the trial's noise.
+    pub seed: u64,
+}
+
+/// Seconds of rolling that a moving ball's place is drawn for: about a kick's preparation.
+const ROLL_TIME: f64 = 1.5;
+
+impl Scenario {
+    /// Reads and checks a scenario file.
+    ///
+    /// # Errors
+    /// When the file is missing, is not TOML of this layout, or has a range that cannot be.
+    pub fn load(file: &Path) -> Result<Self, BenchError> {
+        let name = file.display().to_string();
+        let text = std::fs::read_to_string(file)
+            .map_err(|e| BenchError::File { file: name.clone(), detail: e.to_string() })?;
+        let scenario: Self = toml::from_str(&text)
+            .map_err(|e| BenchError::File { file: name.clone(), detail: e.to_string().trim_end().to_owned() })?;
+        scenario.validate(&name)?;
+        Ok(scenario)
+    }
+
+    /// All scenarios of a folder, by file name.
+    ///
+    /// # Errors
+    /// As [`Scenario::load`], or when the folder cannot be read.
+    pub fn load_all(folder: &Path) -> Result<Vec<Self>, BenchError> {
+        let wrong = |e: std::io::Error| BenchError::File { file: folder.display().to_string(), detail: e.to_string() };
+        let mut files: Vec<_> = std::fs::read_dir(folder)
+            .map_err(wrong)?
+            .filter_map(|entry| entry.ok().map(|e| e.path()))
+            .filter(|path| path.extension().is_some_and(|e| e == "toml"))
+            .collect();
+        files.sort();
+        files.iter().map(|file| Self::load(file)).collect()
+    }
+
+    fn validate(&self, file: &str) -> Result<(), BenchError> {
+        let d = &self.disturbance;
+        let ranges = [
+            ("ball.gap", Some(self.ball.gap)),
+            ("ball.lateral", Some(self.ball.lateral)),
+            ("kick.direction_deg", Some(self.kick.direction_deg)),
+            ("kick.speed", Some(self.kick.speed)),
+            ("pitch.friction", self.pitch.friction),
+            ("pitch.softness", self.pitch.softness),
+            ("model.mass", self.model.mass),
+            ("model.base_forward", self.model.base_forward),
+            ("model.joint_friction", self.model.joint_friction),
+            ("disturbance.push", d.push),
+            ("disturbance.push_before", d.push_before),
+            ("disturbance.ball_moved", d.ball_moved),
+            ("disturbance.ball_moved_before", d.ball_moved_before),
+            ("disturbance.rolling", d.rolling),
+            ("disturbance.rolling_from_deg", d.rolling_from_deg),
+        ];
+        for (field, range) in ranges {
+            if let Some([low, high]) = range
+                && !(low.is_finite() && high.is_finite() && low <= high)
+            {
+                return Err(BenchError::Field {
+                    file: file.to_owned(),
+                    field: field.to_owned(),
+                    found: format!("[{low}, {high}]"),
+                    expected: "two finite numbers, the lower first".into(),
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether each case has its own world.
+    #[must_use]
+    pub fn varies_world(&self) -> bool {
+        self.pitch != PitchRange::default() || self.model != ModelRange::default()
+    }
+
+    /// The first `count` cases for a robot of `size` and a `seed`.
+    #[must_use]
+    pub fn cases(&self, size: &Size, seed: u64, count: usize) -> Vec<Case> {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        (0..count).map(|_| self.case(size, &mut rng)).collect()
+    }
+
+    fn case(&self, size: &Size, rng: &mut ChaCha8Rng) -> Case {
+        let mut draw = |[low, high]: Range| {
+            let share: f64 = rng.random();
+            low + (high - low) * share
+        };
+        let side = if draw([0.0, 1.0]) < 0.5 { 1.0 } else { -1.0 };
+        let gap = draw(self.ball.gap) * size.leg;
+        let lateral = draw(self.ball.lateral) * size.half_width;
+        let target = [size.toes + gap + size.ball, side * lateral];
+        let direction = -side * draw(self.kick.direction_deg).to_radians();
+        let speed = draw(self.kick.speed);
+        let d = &self.disturbance;
+        let turn = std::f64::consts::TAU;
+        // Every draw happens in every scenario, so that adding one field changes no other case.
+        let any = [0.0, 0.0];
+        let (push, push_before, push_angle) =
+            (draw(d.push.unwrap_or(any)), draw(d.push_before.unwrap_or(any)), draw([0.0, turn]));
+        let (moved, moved_before, moved_angle) =
+            (draw(d.ball_moved.unwrap_or(any)), draw(d.ball_moved_before.unwrap_or(any)), draw([0.0, turn]));
+        let (rolling, from) = (draw(d.rolling.unwrap_or(any)), draw(d.rolling_from_deg.unwrap_or(any)).to_radians());
+        let mut one = |range: Option<Range>| {
+            let value = draw(range.unwrap_or(any));
+            range.map(|_| value)
+        };
+        let pitch = [one(self.pitch.friction), one(self.pitch.softness)];
+        let model = ModelError {
+            mass: one(self.model.mass).unwrap_or(1.0),
+            base_shift: [one(self.model.base_forward).unwrap_or(0.0) * size.leg, 0.0, 0.0],
+            joint_friction: one(self.model.joint_friction).unwrap_or(0.0),
+        };
+        // Two normal numbers by Box and Muller.
+        let (u1, u2) = (draw([f64::EPSILON, 1.0]), draw([0.0, turn]));
+        let radius = (-2.0 * u1.ln()).sqrt() * self.sensors.ball;
+
+        // A rolling ball starts where it will pass the drawn place when the foot is ready.
+        let heading = direction + std::f64::consts::PI + from;
+        let start_speed = rolling + size.deceleration * ROLL_TIME * f64::from(u8::from(rolling > 0.0));
+        let way = (start_speed - 0.5 * size.deceleration * ROLL_TIME) * ROLL_TIME * f64::from(u8::from(rolling > 0.0));
+        let ball = [target[0] - way * heading.cos(), target[1] - way * heading.sin()];
+        let ball_velocity = [start_speed * heading.cos(), start_speed * heading.sin()];
+        let request = KickRequest {
+            ball: [ball[0] + radius * u2.cos(), ball[1] + radius * u2.sin()],
+            ball_velocity,
+            direction,
+            strength: Strength::BallSpeed(speed),
+            precision: None,
+            deadline: None,
+            hold: false,
+            foot: None,
+        };
+        let polar = |length: f64, angle: f64| [length * angle.cos(), length * angle.sin()];
+        Case {
+            request,
+            ball,
+            ball_velocity,
+            pitch,
+            model,
+            push: d.push.map(|_| (push_before, d.push_duration.unwrap_or(0.05), polar(push, push_angle))),
+            ball_moved: d.ball_moved.map(|_| (moved_before, polar(moved * size.leg, moved_angle))),
+            seed: rng.random(),
+        }
+    }
+}

@@ -1,0 +1,232 @@
+//! From cells to the table: one row a cell, or one row for all seeds of a cell, as Markdown, CSV and JSON.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use crate::cell::{CellResult, Kicked};
+
+/// One row. The names of the fields are KickBench's file format.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Row {
+    /// Engine.
+    pub engine: String,
+    /// Robot.
+    pub robot: String,
+    /// Scenario.
+    pub scenario: String,
+    /// Seed, or "all".
+    pub seed: SeedName,
+    /// How many requests.
+    pub requests: usize,
+    /// How many were refused.
+    pub refused: usize,
+    /// Why: the cause's name and how often.
+    pub refused_why: BTreeMap<String, usize>,
+    /// Hits over accepted requests; `None` when none was accepted.
+    pub hit_rate: Option<f64>,
+    /// Kicks that ended standing over accepted requests.
+    pub upright_rate: Option<f64>,
+    /// Median of the audited ball speeds, m/s.
+    pub ball_speed_median: Option<f64>,
+    /// Median of the audited ball speeds over the asked ones.
+    pub speed_ratio_median: Option<f64>,
+    /// Median of the absolute direction error of hits, deg.
+    pub direction_error_median_deg: Option<f64>,
+    /// 90th percentile of the same, deg.
+    pub direction_error_p90_deg: Option<f64>,
+    /// Median distance that the ball rolls, m.
+    pub distance_median: Option<f64>,
+    /// Median time from the request to the contact, s.
+    pub contact_median_s: Option<f64>,
+    /// Median time of a plan, s.
+    pub plan_p50_s: Option<f64>,
+    /// 99th percentile of the time of a plan, s.
+    pub plan_p99_s: Option<f64>,
+    /// Median time of a tick, s (of the slowest cell).
+    pub tick_p50_s: f64,
+    /// 99th percentile of the time of a tick, s (of the slowest cell).
+    pub tick_p99_s: f64,
+    /// Impacts that failed the audit.
+    pub audit_invalid: usize,
+    /// Joints beyond torque or speed limits, over all trials.
+    pub limit_violations: usize,
+}
+
+/// A seed, or all of them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(untagged)]
+pub enum SeedName {
+    /// One seed.
+    One(u64),
+    /// All seeds together.
+    All(AllSeeds),
+}
+
+/// Serialised as "all".
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub enum AllSeeds {
+    /// All seeds.
+    #[serde(rename = "all")]
+    All,
+}
+
+impl std::fmt::Display for SeedName {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::One(seed) => write!(f, "{seed}"),
+            Self::All(_) => f.write_str("all"),
+        }
+    }
+}
+
+/// The `share` quantile by the nearest rank.
+#[must_use]
+pub fn quantile(mut values: Vec<f64>, share: f64) -> Option<f64> {
+    values.retain(|v| v.is_finite());
+    values.sort_by(f64::total_cmp);
+    let rank = (share * values.len() as f64).ceil().max(1.0) as usize;
+    values.get(rank - 1).copied()
+}
+
+/// One row a cell.
+#[must_use]
+pub fn rows(cells: &[CellResult]) -> Vec<Row> {
+    cells.iter().map(|cell| row(&[cell], SeedName::One(cell.key.seed))).collect()
+}
+
+/// One row for all seeds of the same engine, robot and scenario, in the cells' order.
+#[must_use]
+pub fn rows_over_seeds(cells: &[CellResult]) -> Vec<Row> {
+    let mut groups: Vec<Vec<&CellResult>> = Vec::new();
+    let key = |cell: &CellResult| (cell.key.engine.clone(), cell.key.robot.clone(), cell.key.scenario.clone());
+    for cell in cells {
+        match groups.iter_mut().find(|group| group.first().is_some_and(|first| key(first) == key(cell))) {
+            Some(group) => group.push(cell),
+            None => groups.push(vec![cell]),
+        }
+    }
+    groups.iter().map(|group| row(group, SeedName::All(AllSeeds::All))).collect()
+}
+
+fn row(cells: &[&CellResult], seed: SeedName) -> Row {
+    let first = &cells[0].key;
+    let outcomes = || cells.iter().flat_map(|cell| &cell.outcomes);
+    let kicked: Vec<&Kicked> = outcomes().filter_map(|outcome| outcome.as_ref().ok()).collect();
+    let mut refused_why = BTreeMap::new();
+    for name in outcomes().filter_map(|outcome| outcome.as_ref().err()) {
+        *refused_why.entry(name.clone()).or_insert(0) += 1;
+    }
+    let rate = |good: fn(&Kicked) -> bool| {
+        (!kicked.is_empty()).then(|| kicked.iter().filter(|k| good(k)).count() as f64 / kicked.len() as f64)
+    };
+    let of = |value: fn(&Kicked) -> Option<f64>, share: f64| {
+        quantile(kicked.iter().filter_map(|k| value(k)).collect(), share)
+    };
+    let error = |k: &Kicked| k.direction_error.map(|e| e.to_degrees().abs());
+    let plans = |share: f64| quantile(cells.iter().flat_map(|c| c.plan_times.iter().copied()).collect(), share);
+    let tick = |i: usize| cells.iter().map(|cell| cell.tick_times[i]).fold(0.0, f64::max);
+    Row {
+        engine: first.engine.clone(),
+        robot: first.robot.clone(),
+        scenario: first.scenario.clone(),
+        seed,
+        requests: outcomes().count(),
+        refused: outcomes().count() - kicked.len(),
+        refused_why,
+        hit_rate: rate(|k| k.hit),
+        upright_rate: rate(|k| k.upright),
+        ball_speed_median: of(|k| k.ball_speed, 0.5),
+        speed_ratio_median: of(|k| k.ball_speed.map(|v| v / k.asked_speed), 0.5),
+        direction_error_median_deg: of(error, 0.5),
+        direction_error_p90_deg: of(error, 0.9),
+        distance_median: of(|k| k.hit.then_some(k.distance), 0.5),
+        contact_median_s: of(|k| k.contact, 0.5),
+        plan_p50_s: plans(0.5),
+        plan_p99_s: plans(0.99),
+        tick_p50_s: tick(0),
+        tick_p99_s: tick(1),
+        audit_invalid: kicked.iter().filter(|k| k.audit_invalid).count(),
+        limit_violations: kicked.iter().map(|k| k.violations).sum(),
+    }
+}
+
+/// Headings and cells of the table for people.
+#[must_use]
+pub fn text_table(rows: &[Row]) -> (Vec<&'static str>, Vec<Vec<String>>) {
+    let head = vec![
+        "engine", "robot", "scenario", "seed", "requests", "refused", "hit %", "upright %", "ball m/s", "of asked",
+        "dir. median deg", "dir. p90 deg", "rolled m", "contact s", "plan p99 ms", "tick p99 us", "audit invalid",
+        "limit violations",
+    ];
+    let number = |value: Option<f64>, factor: f64, digits: usize| {
+        value.map_or_else(|| "-".to_owned(), |v| format!("{:.digits$}", v * factor))
+    };
+    let body = rows
+        .iter()
+        .map(|r| {
+            vec![
+                r.engine.clone(),
+                r.robot.clone(),
+                r.scenario.clone(),
+                r.seed.to_string(),
+                r.requests.to_string(),
+                r.refused.to_string(),
+                number(r.hit_rate, 100.0, 1),
+                number(r.upright_rate, 100.0, 1),
+                number(r.ball_speed_median, 1.0, 2),
+                number(r.speed_ratio_median, 1.0, 2),
+                number(r.direction_error_median_deg, 1.0, 1),
+                number(r.direction_error_p90_deg, 1.0, 1),
+                number(r.distance_median, 1.0, 2),
+                number(r.contact_median_s, 1.0, 2),
+                number(r.plan_p99_s, 1e3, 2),
+                number(Some(r.tick_p99_s), 1e6, 0),
+                r.audit_invalid.to_string(),
+                r.limit_violations.to_string(),
+            ]
+        })
+        .collect();
+    (head, body)
+}
+
+/// The table as Markdown.
+#[must_use]
+pub fn markdown(rows: &[Row]) -> String {
+    let (head, body) = text_table(rows);
+    let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
+    let mut text = line(&head.iter().map(ToString::to_string).collect::<Vec<_>>());
+    text += &format!("|{}\n", "---|".repeat(head.len()));
+    body.iter().for_each(|cells| text += &line(cells));
+    text
+}
+
+/// The table as comma-separated values, with full precision.
+#[must_use]
+pub fn csv(rows: &[Row]) -> String {
+    let mut text = String::new();
+    for (i, row) in rows.iter().enumerate() {
+        let Ok(serde_json::Value::Object(fields)) = serde_json::to_value(row) else { continue };
+        if i == 0 {
+            text += &fields.keys().cloned().collect::<Vec<_>>().join(",");
+            text.push('\n');
+        }
+        let cells = fields.values().map(|value| match value {
+            serde_json::Value::Null => String::new(),
+            serde_json::Value::String(text) => text.clone(),
+            serde_json::Value::Object(map) => {
+                map.iter().map(|(k, v)| format!("{k}:{v}")).collect::<Vec<_>>().join(" ")
+            }
+            other => other.to_string(),
+        });
+        text += &cells.collect::<Vec<_>>().join(",");
+        text.push('\n');
+    }
+    text
+}
+
+/// The table as a JSON object whose `rows` hold one object a row.
+#[must_use]
+pub fn json(rows: &[Row]) -> serde_json::Value {
+    serde_json::json!({ "rows": rows })
+}
