@@ -77,7 +77,11 @@ fn write_all(out: &mut String, tried: &Tried, paint: Paint) -> std::fmt::Result 
         None => writeln!(out, "{}", paint.bad("  The robot did not touch the ball: there is no ball speed."))?,
         Some(impact) => {
             let speed = format!("{:.2} m/s", impact.ball_speed());
-            let speed = if trial.audit.faults.is_empty() { paint.strong(&speed) } else { paint.bad(&speed) };
+            let speed = if trial.audit.faults.is_empty() {
+                paint.strong(&speed)
+            } else {
+                paint.bad(&format!("{speed}, not to be believed: see the audit"))
+            };
             out.push_str(&row("ball speed", speed));
             let angle =
                 |angle: Option<f64>| angle.map_or_else(|| "none".into(), |a| format!("{:.1}\u{b0}", a.to_degrees()));

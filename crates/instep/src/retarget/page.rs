@@ -290,7 +290,7 @@ fn speed_plot(done: &Done, data: &mut RobotData, times: &[f64]) -> Plot {
         }
     }
     let series = robot.groups.iter().zip(shares).map(|(group, shares)| Series::shared(group.clone(), shares));
-    plot("Fastest joint of each group", "% of its limit", series.collect(), &[("limit", 100.0)])
+    plot("Fastest joint of a group", "% of limit", series.collect(), &[("limit", 100.0)])
 }
 
 /// The largest share of its speed limit among a group's joints.
