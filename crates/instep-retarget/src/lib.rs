@@ -11,6 +11,7 @@ pub mod banded;
 mod error;
 mod ik;
 pub mod kinematic;
+pub mod kinodynamic;
 pub mod rescale;
 mod settle;
 mod stance;

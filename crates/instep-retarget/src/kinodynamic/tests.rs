@@ -1,0 +1,265 @@
+//! Derivatives against finite differences, and dynamics against MuJoCo.
+#![allow(clippy::unwrap_used, reason = "tests stop at the first surprise")]
+
+use std::path::Path;
+
+use instep_robot::Robot;
+
+use super::inverse_dynamics::Dynamics;
+use super::tree::Tree;
+
+fn robots() -> Vec<Robot> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots");
+    ["prestoe", "nao"].iter().map(|name| Robot::load(&root.join(name)).unwrap()).collect()
+}
+
+/// Numbers in [-1, 1) without pattern, the same every time.
+pub(super) fn noise(seed: u64, count: usize) -> Vec<f64> {
+    let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15).wrapping_add(1);
+    (0..count)
+        .map(|_| {
+            state ^= state << 13;
+            state ^= state >> 7;
+            state ^= state << 17;
+            (state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+        })
+        .collect()
+}
+
+#[test]
+fn inverse_dynamics_and_momentum_are_mujocos() {
+    for robot in robots() {
+        let tree = Tree::new(&robot);
+        let nv = robot.nv();
+        let mut data = robot.data();
+        let mut dynamics = Dynamics::new(&tree);
+        for seed in 0..5 {
+            let x: Vec<f64> = noise(seed, nv).iter().map(|r| 0.4 * r).collect();
+            let v: Vec<f64> = noise(seed + 100, nv).iter().map(|r| 3.0 * r).collect();
+            let a: Vec<f64> = noise(seed + 200, nv).iter().map(|r| 30.0 * r).collect();
+            dynamics.compute(&tree, &x, &v, &a, false);
+            let (q, w) = tree.state(&x, &v);
+            // The acceleration in MuJoCo's convention, as a difference of its speeds along the motion.
+            let t = 1e-6;
+            let moved = |s: f64| -> Vec<f64> {
+                let x1: Vec<f64> = (0..nv).map(|i| x[i] + s * v[i] + 0.5 * s * s * a[i]).collect();
+                let v1: Vec<f64> = (0..nv).map(|i| v[i] + s * a[i]).collect();
+                tree.state(&x1, &v1).1
+            };
+            let b: Vec<f64> = moved(t).iter().zip(moved(-t)).map(|(p, m)| (p - m) / (2.0 * t)).collect();
+            data.set_state(&q, &w);
+            let mut expected = vec![0.0; nv];
+            data.inverse_dynamics_into(&b, &[], &mut expected);
+            for i in (0..3).chain(6..nv) {
+                let miss = (dynamics.force[i] - expected[i]).abs();
+                assert!(
+                    miss < 1e-4 * (1.0 + expected[i].abs()),
+                    "{} {i}: {} {}",
+                    robot.name,
+                    dynamics.force[i],
+                    expected[i]
+                );
+            }
+            let momentum = data.momentum();
+            let (linear, angular) = dynamics.momentum();
+            for i in 0..3 {
+                assert!((linear[i] - momentum[i]).abs() < 1e-9, "{linear} {momentum:?}");
+                assert!((angular[i] - momentum[3 + i]).abs() < 1e-9, "{angular} {momentum:?}");
+            }
+            assert!((dynamics.com - data.com()).norm() < 1e-12);
+        }
+    }
+}
+
+#[test]
+fn derivatives_of_inverse_dynamics_are_differences() {
+    for robot in robots() {
+        let tree = Tree::new(&robot);
+        let nv = robot.nv();
+        let mut dynamics = Dynamics::new(&tree);
+        let mut state: [Vec<f64>; 3] = [
+            noise(7, nv).iter().map(|r| 0.5 * r).collect(),
+            noise(8, nv).iter().map(|r| 3.0 * r).collect(),
+            noise(9, nv).iter().map(|r| 20.0 * r).collect(),
+        ];
+        let [x, v, a] = &state;
+        dynamics.compute(&tree, x, v, a, true);
+        let analytic = [dynamics.by_position.clone(), dynamics.by_speed.clone(), dynamics.by_acceleration.clone()];
+        let momentum: Vec<_> = (0..nv).map(|i| dynamics.angular_momentum_by(&tree, i)).collect();
+        let e = 1e-6;
+        for part in 0..3 {
+            for j in 0..nv {
+                let mut sides = Vec::new();
+                for sign in [1.0, -1.0] {
+                    state[part][j] += sign * e;
+                    let [x, v, a] = &state;
+                    dynamics.compute(&tree, x, v, a, false);
+                    sides.push((dynamics.force.clone(), dynamics.momentum().1));
+                    state[part][j] -= sign * e;
+                }
+                for i in 0..nv {
+                    let difference = (sides[0].0[i] - sides[1].0[i]) / (2.0 * e);
+                    let miss = (difference - analytic[part][i * nv + j]).abs();
+                    assert!(
+                        miss < 1e-5 * (1.0 + difference.abs()),
+                        "{} {part} {i} {j}: {difference} {}",
+                        robot.name,
+                        analytic[part][i * nv + j]
+                    );
+                }
+                let difference = (sides[0].1 - sides[1].1) / (2.0 * e);
+                let own = [momentum[j].0, momentum[j].1, nalgebra::Vector3::zeros()][part];
+                assert!((difference - own).norm() < 1e-6, "{part} {j}: {difference} {own}");
+            }
+        }
+    }
+}
+
+/// A plan of our own: half a second of standing, the left toes lifted for a while, the right foot swinging.
+pub(super) fn started(robot: &Robot) -> crate::kinematic::Retargeted {
+    use crate::kinematic::{Retargeted, Status};
+    use crate::rescale::{Target, Targets, keypoints};
+    use instep_motion::contact::{ContactSchedule, FootContact, Stance};
+    use instep_motion::phase::{KickPhases, Side};
+    use instep_motion::reference::{Reference, ReferenceKind, Source};
+    use nalgebra::{UnitQuaternion, Vector3};
+
+    let count = 61;
+    let keypoints = keypoints(robot).unwrap();
+    let mut data = robot.data();
+    let mut positions = Vec::new();
+    let mut frames = Vec::new();
+    for k in 0..count {
+        let mut q = robot.stand.clone();
+        q[0] -= 0.9;
+        q[1] += 0.55;
+        let s = (k as f64 / 60.0 * std::f64::consts::TAU).sin();
+        for (i, x) in q[7..].iter_mut().enumerate() {
+            *x += 0.05 * s * ((i % 3) as f64 - 1.0);
+        }
+        data.set_position(&q);
+        frames.push(Target {
+            positions: keypoints.iter().map(|p| data.point(&p.at)).collect(),
+            pelvis: UnitQuaternion::identity(),
+            chest: UnitQuaternion::identity(),
+            soles: [UnitQuaternion::identity(); 2],
+            toes: [UnitQuaternion::identity(); 2],
+        });
+        positions.push(q);
+    }
+    let phases = KickPhases { kick_foot: Side::Right, t_plant: 0.0, t_swing: 0.2, t_lock: 0.25, t_impact: 0.3 };
+    let foot = |from: usize, to: usize| FootContact {
+        heel: (0..count).map(|k| !(from..to).contains(&k)).collect(),
+        toe: vec![true; count],
+        stance: vec![true; count],
+        stances: vec![Stance { start: 0, end: count - 1 }],
+    };
+    let right = FootContact {
+        heel: (0..count).map(|k| k < 20).collect(),
+        toe: (0..count).map(|k| k < 24).collect(),
+        stance: (0..count).map(|k| k < 24).collect(),
+        stances: vec![Stance { start: 0, end: 23 }],
+    };
+    let reference = Reference {
+        format: Reference::FORMAT,
+        robot: robot.name.clone(),
+        kind: ReferenceKind::Kinematic,
+        source: Source { clip: "own".into(), skeleton: None, clip_start: 0.0, acknowledgement: String::new() },
+        rate: 30.0,
+        ball: [0.0, 0.0, 0.11],
+        phases,
+        joint_names: robot.joints.iter().map(|j| j.name.clone()).collect(),
+        contact_names: robot.contacts.iter().map(|c| c.name.clone()).collect(),
+        knots: Vec::new(),
+    };
+    Retargeted {
+        reference,
+        phases,
+        positions,
+        targets: Targets { keypoints, frames, human: vec![vec![Vector3::zeros()]; count], scale: 1.0 },
+        contacts: ContactSchedule { rate: 120.0, ground: 0.0, feet: [foot(40, 50), right] },
+        keypoint_errors: Vec::new(),
+        max_stance_slip: 0.0,
+        status: Status::Solved,
+        iterations: 0,
+        violations: std::collections::BTreeMap::new(),
+    }
+}
+
+/// Every row of every family at several nodes: its gradient is the difference of its value.
+#[test]
+fn gradients_of_all_rows_are_differences() {
+    use super::node::{Scratch, rows};
+    use super::plan::Plan;
+    use super::settings::KinodynamicSettings;
+    use super::terms::{FAMILIES, Pass, Row, Sink};
+    use crate::kinematic::Weights;
+
+    for robot in robots() {
+        let start = started(&robot);
+        let settings = KinodynamicSettings { foot_speed: Some(9.0), ..KinodynamicSettings::default() };
+        let mut settings = settings;
+        settings.weights.q_i = [0.3, 0.2, 0.1];
+        let plan = Plan::new(&robot, &start, &Weights::default(), &settings).unwrap();
+        let nv = robot.nv();
+        let mut scratch = Scratch::new(&plan);
+        let rho = [1.0; FAMILIES];
+        let mut seen = std::collections::BTreeSet::new();
+        for k in [0, 18, 23, 30, 36, 45] {
+            let forces = 3 * plan.nodes[k].pushing.len();
+            let mut z: Vec<f64> = noise(k as u64, 3 * nv + forces);
+            for (i, z) in z.iter_mut().enumerate() {
+                *z *= [0.1, 2.0, 20.0, 0.3][(i / nv).min(3)];
+            }
+            z[..nv].iter_mut().zip(&plan.nodes[k].posture).for_each(|(z, x)| *z += x);
+            let mut collect = |z: &[f64], derivatives: bool| {
+                let mut out = vec![("first".to_owned(), 0.0, Row::new(nv, forces))];
+                let mut multipliers = Vec::new();
+                let mut sink = Sink::new(Pass::Collect(&mut out), k, &rho, &mut multipliers);
+                let parts = [&z[..nv], &z[nv..2 * nv], &z[2 * nv..3 * nv], &z[3 * nv..]];
+                rows(&plan, k, parts, derivatives, &mut scratch, &mut sink);
+                out
+            };
+            let analytic = collect(&z, true);
+            let e = 1e-6;
+            for i in 0..z.len() {
+                let mut sides = Vec::new();
+                for sign in [1.0, -1.0] {
+                    z[i] += sign * e;
+                    sides.push(collect(&z, false));
+                    z[i] -= sign * e;
+                }
+                for (row, (family, _, gradient)) in analytic.iter().enumerate() {
+                    let difference = (sides[0][row].1 - sides[1][row].1) / (2.0 * e);
+                    let own =
+                        [&gradient.q, &gradient.v, &gradient.a, &gradient.f][(i / nv).min(3)][i - nv * (i / nv).min(3)];
+                    let miss = (difference - own).abs();
+                    assert!(
+                        miss < 2e-5 * (1.0 + difference.abs()),
+                        "{} node {k} {family} row {row} by {i}: {difference} {own}",
+                        robot.name
+                    );
+                    seen.insert(family.clone());
+                }
+            }
+        }
+        let expected = [
+            "base_dynamics",
+            "friction",
+            "contact",
+            "contact_speed",
+            "penetration",
+            "torque",
+            "approach_angle",
+            "self_collision",
+            "cost",
+            "gradient_only",
+        ];
+        for family in expected {
+            assert!(
+                seen.contains(family) || (family == "self_collision" && robot.self_collision.is_empty()),
+                "{family} was not tried"
+            );
+        }
+    }
+}
