@@ -25,11 +25,6 @@ impl Banded {
         Self { size, rows: below + 1, entries: vec![0.0; size * (below + 1)] }
     }
 
-    /// Sets every entry to zero.
-    pub fn clear(&mut self) {
-        self.entries.fill(0.0);
-    }
-
     /// Adds `value` to entry (`row`, `column`), of which the row must not be above the diagonal nor out of the band.
     pub fn add(&mut self, row: usize, column: usize, value: f64) {
         debug_assert!(row >= column && row - column < self.rows, "inside the lower band");
@@ -41,9 +36,22 @@ impl Banded {
         &mut self.entries[column * self.rows..(column + 1) * self.rows]
     }
 
-    /// Becomes a copy of `other`, which has the same size.
+    /// Sets every entry to zero.
+    pub fn clear(&mut self) {
+        self.entries.fill(0.0);
+    }
+
+    /// Becomes a zero matrix of `size` rows with the same band, keeping its memory.
+    pub fn resize(&mut self, size: usize) {
+        self.size = size;
+        self.entries.clear();
+        self.entries.resize(size * self.rows, 0.0);
+    }
+
+    /// Becomes a copy of `other`, keeping its memory.
     pub fn copy_from(&mut self, other: &Self) {
-        self.entries.copy_from_slice(&other.entries);
+        (self.size, self.rows) = (other.size, other.rows);
+        self.entries.clone_from(&other.entries);
     }
 
     /// Takes variable `index` out of the system: its row and column become those of the identity.

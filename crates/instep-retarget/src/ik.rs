@@ -7,12 +7,14 @@
 //! - the acceleration q_{k+1} - 2 q_k + q_{k-1} of base and joints: smoothness in time;
 //! - for a contact point that stands: its distance from its anchor, the mean place over its whole stance, on the
 //!   ground (11), (12). An anchor instead of differences between neighbours keeps errors from adding up;
-//! - depth below the ground (13) and overlap of capsules (14), one-sided;
+//! - depth below the ground (13), or below the clearance of a swinging foot, and overlap of capsules (14), one-sided;
 //! - a slight pull to the standing pose, for joints that nothing else sees.
 //!
 //! Joint limits (16) are exact: a joint at its limit that would go on is taken out of the step (projected
 //! Gauss-Newton, Bertsekas 1982). The Hessian is banded, two frames wide; see [`crate::banded`]. The first guess
-//! solves frame after frame from the one before.
+//! solves frame after frame from the one before; after that, stretches that no longer move are left alone.
+
+use std::ops::Range;
 
 use instep_robot::{LinkPoint, Robot, RobotData};
 use nalgebra::{UnitQuaternion, Vector3};
@@ -26,8 +28,14 @@ use crate::stance::Stance;
 /// Gauss-Newton steps for a frame of the first guess; the first frame gets more.
 const GUESS_STEPS: usize = 3;
 const FIRST_FRAME_STEPS: usize = 40;
+/// A frame that went less far than this (rad, m) in an iteration is left alone in the next.
+const STILL: f64 = 2e-3;
+/// Frames beside one that still moves which are solved with it.
+const WINDOW_MARGIN: usize = 4;
 /// Damping values that are tried for a step before the cost counts as lowest.
-const DAMPING_TRIES: usize = 4;
+const DAMPING_TRIES: usize = 6;
+/// Damping that every direction has, for those that nothing sees.
+const LEAST_DAMPING: f64 = 1e-6;
 /// Gap that capsules should keep, m.
 const CLEARANCE: f64 = 0.005;
 
@@ -58,30 +66,31 @@ pub(crate) struct ClipIk<'a> {
     pub anchors: Vec<Stance>,
     /// For each frame, the anchors that hold then.
     held: Vec<Vec<usize>>,
+    /// For each frame, the height that points of the left and the right foot keep while they do not stand, m.
+    clearance: Vec<[f64; 2]>,
     jacobian: Vec<f64>,
     second: Vec<f64>,
     difference: [Vec<f64>; 2],
 }
 
 /// The normal equations of a Gauss-Newton step.
-#[derive(Clone)]
-pub(crate) struct System {
+struct System {
     matrix: Banded,
     gradient: Vec<f64>,
     nv: usize,
 }
 
 impl System {
-    /// Empty equations for `frames` frames of `nv` unknowns, of which each is coupled to the next two.
-    pub(crate) fn new(frames: usize, nv: usize) -> Self {
-        let size = frames * nv;
-        let below = (3 * nv).min(size) - 1;
-        Self { matrix: Banded::zeros(size, below), gradient: vec![0.0; size], nv }
+    /// Empty equations for frames of `nv` unknowns, each coupled to the next two.
+    fn new(nv: usize) -> Self {
+        Self { matrix: Banded::zeros(0, 3 * nv - 1), gradient: Vec::new(), nv }
     }
 
-    fn clear(&mut self) {
-        self.matrix.clear();
-        self.gradient.fill(0.0);
+    /// Zero equations for `frames` frames.
+    fn clear(&mut self, frames: usize) {
+        self.matrix.resize(frames * self.nv);
+        self.gradient.clear();
+        self.gradient.resize(frames * self.nv, 0.0);
     }
 
     /// Adds `weight` J^T J and `weight` J^T r of a residual with `rows` rows for the frame that starts at `offset`.
@@ -103,8 +112,29 @@ impl System {
     }
 }
 
+/// What is kept between iterations, one entry a frame.
+pub(crate) struct State {
+    systems: [System; 2],
+    damping: Vec<f64>,
+    /// How far each frame went in the last iteration, rad or m.
+    pub moved: Vec<f64>,
+}
+
+impl State {
+    pub(crate) fn new(frames: usize, nv: usize) -> Self {
+        let systems = [System::new(nv), System::new(nv)];
+        Self { systems, damping: vec![1e-4; frames], moved: vec![f64::INFINITY; frames] }
+    }
+}
+
 impl<'a> ClipIk<'a> {
-    pub(crate) fn new(robot: &'a Robot, targets: &'a Targets, weights: &'a Weights, anchors: Vec<Stance>) -> Self {
+    pub(crate) fn new(
+        robot: &'a Robot,
+        targets: &'a Targets,
+        weights: &'a Weights,
+        anchors: Vec<Stance>,
+        clearance: Vec<[f64; 2]>,
+    ) -> Self {
         let mut data = robot.data();
         // A pose without symmetry, in which every joint that can move a point does.
         let mut generic = robot.stand.clone();
@@ -158,7 +188,21 @@ impl<'a> ClipIk<'a> {
         let jacobian = vec![0.0; 3 * nv];
         let second = jacobian.clone();
         let difference = [vec![0.0; nv], vec![0.0; nv]];
-        Self { robot, data, targets, weights, points, turns, contacts, anchors, held, jacobian, second, difference }
+        Self {
+            robot,
+            data,
+            targets,
+            weights,
+            points,
+            turns,
+            contacts,
+            anchors,
+            held,
+            clearance,
+            jacobian,
+            second,
+            difference,
+        }
     }
 
     /// The terms of one frame at the position `q`: their cost, and, into `system` at `offset`, their derivatives.
@@ -195,7 +239,7 @@ impl<'a> ClipIk<'a> {
             } else {
                 None
             };
-            let depth = at.z - contact.radius;
+            let depth = at.z - contact.radius - self.clearance[frame][contact.leg as usize];
             let residual = match anchor {
                 Some(anchor) => at - anchor.place,
                 None if depth < 0.0 => Vector3::z() * depth,
@@ -247,28 +291,34 @@ impl<'a> ClipIk<'a> {
         cost
     }
 
-    /// The acceleration terms of all frames.
-    fn smoothness(&mut self, positions: &[Vec<f64>], rate: f64, mut system: Option<&mut System>) -> f64 {
+    /// The acceleration terms that the frames of `window` have a part in; derivatives for those frames only.
+    fn smoothness(
+        &mut self,
+        positions: &[Vec<f64>],
+        window: &Range<usize>,
+        rate: f64,
+        mut system: Option<&mut System>,
+    ) -> f64 {
         let nv = self.robot.nv();
         let scale = rate.powi(4);
         let weight = |j: usize| scale * if j < 3 { self.weights.base_acceleration } else { self.weights.acceleration };
         let mut cost = 0.0;
-        for k in 1..positions.len() - 1 {
+        let middles = window.start.saturating_sub(1).max(1)..(window.end + 1).min(positions.len().saturating_sub(1));
+        for k in middles {
             let [before, after] = &mut self.difference;
             self.data.difference_into(&positions[k - 1], &positions[k], 1.0, before);
             self.data.difference_into(&positions[k], &positions[k + 1], 1.0, after);
+            let parts = [(k - 1, 1.0), (k, -2.0), (k + 1, 1.0)];
             for j in 0..nv {
                 let residual = after[j] - before[j];
                 let w = weight(j);
                 cost += w * residual * residual;
                 let Some(system) = system.as_deref_mut() else { continue };
-                let index = |frame: usize| frame * nv + j;
-                for (a, s) in [(k - 1, 1.0), (k, -2.0), (k + 1, 1.0)] {
-                    system.gradient[index(a)] += w * s * residual;
-                    for (b, t) in [(k - 1, 1.0), (k, -2.0), (k + 1, 1.0)] {
-                        if a >= b {
-                            system.matrix.add(index(a), index(b), w * s * t);
-                        }
+                let index = |frame: usize| (frame - window.start) * nv + j;
+                for (a, s) in parts.iter().filter(|(a, _)| window.contains(a)) {
+                    system.gradient[index(*a)] += w * s * residual;
+                    for (b, t) in parts.iter().filter(|(b, _)| window.contains(b) && b <= a) {
+                        system.matrix.add(index(*a), index(*b), w * s * t);
                     }
                 }
             }
@@ -279,7 +329,7 @@ impl<'a> ClipIk<'a> {
     /// The first guess: every frame solved alone, from the one before.
     pub(crate) fn guess(&mut self) -> Result<Vec<Vec<f64>>, RetargetError> {
         let nv = self.robot.nv();
-        let mut system = System::new(1, nv);
+        let mut system = System { matrix: Banded::zeros(nv, nv - 1), gradient: vec![0.0; nv], nv };
         let mut q = self.robot.stand.clone();
         let pelvis = self.targets.keypoints.iter().position(|k| k.at.link == self.robot.base);
         if let Some(first) = self.targets.frames.first() {
@@ -293,9 +343,9 @@ impl<'a> ClipIk<'a> {
         for frame in 0..self.targets.frames.len() {
             let steps = if frame == 0 { FIRST_FRAME_STEPS } else { GUESS_STEPS };
             for iteration in 0..steps {
-                system.clear();
+                system.clear(1);
                 self.frame(frame, &q, false, Some((&mut system, 0)));
-                let step = self.step(&mut system, std::slice::from_ref(&q), 1e-4, iteration)?;
+                let step = self.step(&mut system, std::slice::from_ref(&q), &[1e-3], iteration)?;
                 // A long step would leave the region where the derivatives hold.
                 let longest = step.iter().fold(0.0_f64, |most, s| most.max(s.abs()));
                 self.advance(&mut q, &step, (0.5 / longest).min(1.0));
@@ -305,46 +355,66 @@ impl<'a> ClipIk<'a> {
         Ok(guesses)
     }
 
-    /// One iteration over the whole clip from `positions`; returns the new positions, or `None` where no damping lowers
-    /// the cost, and the cost before and after. `damping` is Levenberg and Marquardt's and is kept between iterations.
+    /// One iteration over the frames of `window`, the others held. `damping` is Levenberg and Marquardt's, kept between
+    /// iterations; each frame has its own, so that a few difficult frames do not hold up all others. `moved` says how
+    /// far each frame went, infinity where no damping lowered the cost. Returns by how much the cost fell, and what of
+    /// it is left.
     pub(crate) fn iterate(
         &mut self,
-        positions: &[Vec<f64>],
+        positions: &mut [Vec<f64>],
+        window: &Range<usize>,
         rate: f64,
         iteration: usize,
-        damping: &mut f64,
-        [system, attempt]: &mut [System; 2],
-    ) -> Result<(Option<Vec<Vec<f64>>>, f64, f64), RetargetError> {
+        state: &mut State,
+    ) -> Result<(f64, f64), RetargetError> {
         let nv = self.robot.nv();
-        system.clear();
-        let mut cost = self.smoothness(positions, rate, Some(system));
-        for (frame, q) in positions.iter().enumerate() {
-            cost += self.frame(frame, q, true, Some((system, frame * nv)));
+        let State { systems: [system, attempt], damping, moved } = state;
+        system.clear(window.len());
+        let mut before = self.smoothness(positions, window, rate, Some(system));
+        let mut frames_before = Vec::with_capacity(window.len());
+        for frame in window.clone() {
+            let offset = (frame - window.start) * nv;
+            frames_before.push(self.frame(frame, &positions[frame], true, Some((system, offset))));
         }
+        before += frames_before.iter().sum::<f64>();
+        let held: Vec<Vec<f64>> = positions[window.clone()].to_vec();
         for _ in 0..DAMPING_TRIES {
             attempt.matrix.copy_from(&system.matrix);
-            attempt.gradient.copy_from_slice(&system.gradient);
-            let step = self.step(attempt, positions, *damping, iteration)?;
-            let mut trial = positions.to_vec();
-            for (q, step) in trial.iter_mut().zip(step.chunks(nv)) {
-                self.advance(q, step, 1.0);
+            attempt.gradient.clone_from(&system.gradient);
+            let step = self.step(attempt, &held, &damping[window.clone()], iteration)?;
+            for ((frame, step), held) in window.clone().zip(step.chunks(nv)).zip(&held) {
+                positions[frame].clone_from(held);
+                self.advance(&mut positions[frame], step, 1.0);
+                moved[frame] = step.iter().fold(0.0, |most, s| s.abs().max(most));
             }
-            let after = self.cost(&trial, rate);
-            if after < cost {
-                *damping = (*damping / 10.0).max(1e-6);
-                return Ok((Some(trial), cost, after));
+            let mut after = self.smoothness(positions, window, rate, None);
+            for (frame, was) in window.clone().zip(&frames_before) {
+                let now = self.frame(frame, &positions[frame], true, None);
+                after += now;
+                damping[frame] = if now > *was { damping[frame] * 20.0 } else { (damping[frame] / 10.0).max(1e-5) };
             }
-            *damping *= 30.0;
+            if after < before {
+                return Ok((before - after, after));
+            }
         }
-        Ok((None, cost, cost))
+        for (frame, held) in window.clone().zip(held) {
+            positions[frame] = held;
+            moved[frame] = f64::INFINITY;
+        }
+        Ok((0.0, before))
     }
 
-    fn cost(&mut self, positions: &[Vec<f64>], rate: f64) -> f64 {
-        let mut cost = self.smoothness(positions, rate, None);
-        for (frame, q) in positions.iter().enumerate() {
-            cost += self.frame(frame, q, true, None);
+    /// The stretches of frames that still move, with some frames on either side.
+    pub(crate) fn windows(moved: &[f64]) -> Vec<Range<usize>> {
+        let mut windows: Vec<Range<usize>> = Vec::new();
+        for frame in (0..moved.len()).filter(|&frame| moved[frame] > STILL) {
+            let (start, end) = (frame.saturating_sub(WINDOW_MARGIN), (frame + WINDOW_MARGIN + 1).min(moved.len()));
+            match windows.last_mut() {
+                Some(last) if last.end >= start => last.end = end,
+                _ => windows.push(start..end),
+            }
         }
-        cost
+        windows
     }
 
     /// Solves for the step, with joints that push against their limits taken out.
@@ -352,13 +422,15 @@ impl<'a> ClipIk<'a> {
         &self,
         system: &mut System,
         positions: &[Vec<f64>],
-        damping: f64,
+        damping: &[f64],
         iteration: usize,
     ) -> Result<Vec<f64>, RetargetError> {
         let nv = system.nv;
-        for (frame, q) in positions.iter().enumerate() {
+        for ((frame, q), damping) in positions.iter().enumerate().zip(damping) {
             for j in 0..nv {
-                system.matrix.add(frame * nv + j, frame * nv + j, damping);
+                // Marquardt's scaling: stiff directions are damped as much as soft ones.
+                let diagonal = &mut system.matrix.column_mut(frame * nv + j)[0];
+                *diagonal += damping * *diagonal + LEAST_DAMPING;
             }
             for (i, joint) in self.robot.joints.iter().enumerate() {
                 let index = frame * nv + 6 + i;

@@ -18,9 +18,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::RetargetError;
 use crate::assemble;
-use crate::ik::{ClipIk, System};
+use crate::ik::{ClipIk, State};
 use crate::rescale::{Targets, landmark_name, rescale};
-use crate::settle::settle;
+use crate::settle::{clearance, settle};
 use crate::stance::stances;
 
 /// Iterations in which the places of standing feet still follow the motion; then they are fixed.
@@ -78,17 +78,17 @@ impl Default for Weights {
     fn default() -> Self {
         Self {
             pelvis: 3.0,
-            knee: 1.0,
+            knee: 1.5,
             ankle: 5.0,
-            toe: 2.0,
+            toe: 1.0,
             chest: 1.0,
             arm: 0.5,
             pelvis_turn: 0.2,
             chest_turn: 0.1,
-            sole_turn: 0.1,
-            toe_turn: 0.02,
+            sole_turn: 0.05,
+            toe_turn: 0.01,
             contact: 1e4,
-            penetration: 300.0,
+            penetration: 1e3,
             collision: 300.0,
             acceleration: 3e-10,
             base_acceleration: 3e-9,
@@ -125,7 +125,7 @@ pub struct KinematicSettings {
     pub weights: Weights,
     /// Most Gauss-Newton iterations over the whole clip.
     pub iterations: usize,
-    /// Relative fall of the cost in one iteration below which the solver stops.
+    /// Relative fall of the cost below which, twice in a row, the solver stops.
     pub tolerance: f64,
     /// Radius of the ball that the reference is laid out for, m.
     pub ball_radius: f64,
@@ -141,7 +141,7 @@ impl Default for KinematicSettings {
             form: ContactForm::Enforced,
             rate: 30.0,
             weights: Weights::default(),
-            iterations: 12,
+            iterations: 20,
             tolerance: 1e-2,
             ball_radius: 0.11,
             contact: ContactSettings::default(),
@@ -233,29 +233,39 @@ pub fn retarget(
         ContactForm::Enforced => stances.clone(),
         ContactForm::Slip => Vec::new(),
     };
-    let mut ik = ClipIk::new(robot, &targets, &settings.weights, anchors);
+    let clearance = match settings.form {
+        ContactForm::Enforced => clearance(&contacts),
+        ContactForm::Slip => vec![[0.0; 2]; targets.frames.len()],
+    };
+    let mut ik = ClipIk::new(robot, &targets, &settings.weights, anchors, clearance);
     let mut positions = ik.guess()?;
     let mut status = Status::OutOfIterations;
     let mut iterations = 0;
-    let mut damping = 1e-4;
-    let empty = System::new(positions.len(), robot.nv());
-    let mut systems = [empty.clone(), empty];
+    let mut was_small = false;
+    let mut state = State::new(positions.len(), robot.nv());
+    let mut total = f64::INFINITY;
     while iterations < settings.iterations {
         if iterations < ANCHOR_SETTLING {
             ik.settle_anchors(&positions);
         }
-        let (better, before, after) = ik.iterate(&positions, clip.rate, iterations, &mut damping, &mut systems)?;
+        let mut fall = 0.0;
+        for window in ClipIk::windows(&state.moved) {
+            let (fallen, left) = ik.iterate(&mut positions, &window, clip.rate, iterations, &mut state)?;
+            fall += fallen;
+            if window.len() == positions.len() {
+                total = fallen + left;
+            }
+        }
+        total -= fall;
         iterations += 1;
-        progress(Progress { iteration: iterations, iterations: settings.iterations, cost: after });
-        let Some(better) = better else {
-            status = Status::Solved;
-            break;
-        };
-        positions = better;
-        if before - after < settings.tolerance * before {
+        progress(Progress { iteration: iterations, iterations: settings.iterations, cost: total });
+        // One small step may only mean that a few frames are still being damped; two in a row mean the end.
+        let small = fall < settings.tolerance * total;
+        if small && was_small {
             status = Status::Solved;
             break;
         }
+        was_small = small;
     }
 
     let mut errors = vec![0.0; targets.keypoints.len()];

@@ -4,6 +4,9 @@
 //! During a stance the foot keeps one place and one heading, its mean over the stance; flat while heel and toe stand,
 //! rolling over the toe or the heel while only that one stands, never sideways. Before and after, the correction fades
 //! out, so that the target does not jump at touch-down and lift-off, where it would ask for impossible joint speeds.
+//!
+//! A foot in the air is kept at least a little above the ground. The human's shoe grazes it, and scaled to another foot
+//! that becomes a stumble.
 
 use instep_motion::contact::{ContactSchedule, FootContact, Stance};
 use instep_motion::landmark::Landmark;
@@ -16,6 +19,9 @@ use crate::stance::is_toe;
 
 /// Time over which a correction fades out beside a stance, s.
 const FADE: f64 = 0.12;
+
+/// Least height of a swinging sole above the ground, m; reached over the same time beside a stance.
+const CLEARANCE: f64 = 0.03;
 
 /// Where the foot is: its toe joint and its rotation.
 #[derive(Debug, Clone, Copy)]
@@ -54,6 +60,22 @@ pub(crate) fn settle(robot: &Robot, targets: &mut Targets, contacts: &ContactSch
             }
         }
     }
+}
+
+/// Height above the ground that each foot's points should keep at each frame while they do not stand, m: left, right.
+/// Zero in a stance, rising to the full clearance as the foot is away from it.
+pub(crate) fn clearance(contacts: &ContactSchedule) -> Vec<[f64; 2]> {
+    let fade = FADE * contacts.rate;
+    (0..contacts.feet[0].stance.len())
+        .map(|frame| {
+            [Side::Left, Side::Right].map(|side| {
+                let gap = |s: &Stance| s.start.saturating_sub(frame).max(frame.saturating_sub(s.end));
+                let away = contacts.foot(side).stances.iter().map(gap).min().unwrap_or(usize::MAX);
+                let share = (away as f64 / fade).min(1.0);
+                CLEARANCE * share * share * (3.0 - 2.0 * share)
+            })
+        })
+        .collect()
 }
 
 fn contains(stance: Stance, frame: usize) -> bool {

@@ -70,6 +70,19 @@ pub fn torque_range(joint: &Joint, speed: f64) -> [f64; 2] {
     [-joint.torque * share(-speed), joint.torque * share(speed)]
 }
 
+/// As [`torque_range`], for a torque that is held over a whole time step: what the law allows at the speed that the
+/// torque itself leads to, so that a strong motor on a light link does not overshoot its speed limit within the step.
+/// `step_over_inertia` is the step (s) over the least inertia that the motor can find before it (kg m^2).
+#[must_use]
+pub fn torque_range_over_step(joint: &Joint, speed: f64, step_over_inertia: f64) -> [f64; 2] {
+    // On the falling line the law is torque = slope (limit - v); at the end of the step v + torque step / inertia.
+    let slope = joint.torque / (joint.speed * (1.0 - joint.corner));
+    let most = |toward: f64| {
+        (slope * (joint.speed - toward) / (1.0 + slope * step_over_inertia)).clamp(-joint.torque, joint.torque)
+    };
+    [-most(-speed), most(speed)]
+}
+
 /// The torque (N m) of `joint`'s drive for the targets `position`, `velocity` and `torque` at the measured `q` and
 /// `v`: proportional-derivative control plus the added torque, within what the motor can give.
 #[must_use]
