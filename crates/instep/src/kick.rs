@@ -1,5 +1,6 @@
 //! `instep kick`: a robot plays a reference against a ball; what happens is measured, audited, shown and recorded.
 
+mod engine;
 mod page;
 mod recording;
 mod summary;
@@ -50,6 +51,18 @@ pub(crate) struct Kick {
     /// Folder for report.html and kick.mcap
     #[arg(long, value_name = "FOLDER", default_value = "out/kick")]
     out: PathBuf,
+    /// Kick on request with this engine (dynamic, dynamic-open) in place of playing a reference
+    #[arg(long, value_name = "ENGINE", conflicts_with_all = ["reference", "start", "duration"])]
+    engine: Option<String>,
+    /// With --engine: direction of the ball, in degrees from straight ahead to the left
+    #[arg(long, value_name = "ANGLE", allow_hyphen_values = true, value_parser = degrees, requires = "engine", default_value = "0deg")]
+    direction: f64,
+    /// With --engine: speed of the ball, in m/s
+    #[arg(long, value_name = "SPEED", allow_negative_numbers = true, requires = "engine", default_value_t = 1.0)]
+    speed: f64,
+    /// With --engine: a file of requests (a JSON array, or one JSON object a line) in place of --ball
+    #[arg(long, value_name = "FILE", requires = "engine", conflicts_with_all = ["ball", "direction", "speed"])]
+    requests: Option<PathBuf>,
     /// Constants of the world, as TOML; what is absent keeps its default
     #[arg(long, value_name = "FILE")]
     world: Option<PathBuf>,
@@ -61,6 +74,18 @@ fn point(text: &str) -> Result<[f64; 2], String> {
     text.split_once(',')
         .and_then(|(x, y)| Some([number(x)?, number(y)?]))
         .ok_or_else(|| "expected two numbers in metres, such as 0.0,-0.02".into())
+}
+
+/// `10deg`, `10` (both degrees) or `0.17rad`; gives radians.
+fn degrees(text: &str) -> Result<f64, String> {
+    let text = text.trim();
+    let (number, factor) = match text.strip_suffix("rad") {
+        Some(number) => (number, 1.0),
+        None => (text.strip_suffix("deg").unwrap_or(text), std::f64::consts::PI / 180.0),
+    };
+    let value =
+        number.trim().parse::<f64>().map_err(|_| "expected an angle, such as 10deg, -40 or 0.2rad".to_owned())?;
+    Ok(value * factor)
 }
 
 /// Everything about one kick that was tried.
@@ -83,11 +108,14 @@ impl Kick {
     /// When something handed in cannot be used or the simulation diverges. How the kick went is no error.
     pub(crate) fn run(self, output: &Output) -> Result<ExitCode, Failure> {
         let world = self.world.as_deref().map(world_settings).transpose()?.unwrap_or_default();
+        if let Some(name) = &self.engine {
+            return self.on_request(name, output);
+        }
         let reference_file = places::reference(&self.reference)?;
         let reference = Arc::new(Reference::load(&reference_file)?);
         let robot = Arc::new(places::robot(self.robot.as_deref().unwrap_or(&reference.robot))?);
         let phases = &reference.phases;
-        let start = self.start.unwrap_or_else(|| phases.t_plant.min(phases.t_swing).max(0.0));
+        let start = self.start.unwrap_or(phases.t_plant);
         let mut engine = Playback::new(&robot, Arc::clone(&reference), start)
             .map_err(|error| Failure::from(error).about(reference_file.display()))?;
         let until = reference.duration().max(phases.t_impact + AFTERMATH);
@@ -118,6 +146,25 @@ impl Kick {
         tried.write()?;
         output.show(&Measures::new(&tried), |paint| summary::text(&tried, paint))?;
         Ok(ExitCode::SUCCESS)
+    }
+}
+
+impl Kick {
+    /// Kicks on request.
+    fn on_request(&self, engine: &str, output: &Output) -> Result<ExitCode, Failure> {
+        let Some(robot) = self.robot.as_deref() else {
+            return Err(Failure::input("--robot: which robot is to kick? such as --robot wolfgang"));
+        };
+        let subject = instep_bench::Subject::of(places::robot(robot)?)?;
+        let requests = match (&self.requests, self.ball) {
+            (Some(file), _) => engine::load(file)?,
+            (None, Some(ball)) => {
+                vec![engine::Wanted { ball, direction: self.direction, speed: self.speed }.request()]
+            }
+            (None, None) => return Err(Failure::input("--ball: where is the ball? such as --ball 0.2,-0.05")),
+        };
+        let world = self.world.as_deref().map(world_settings).transpose()?;
+        engine::run(&subject, engine, &requests, world, self.seed, output)
     }
 }
 

@@ -7,18 +7,18 @@ use mujoco_rs::prelude::*;
 
 /// What one block impact gave.
 #[derive(Debug, Clone, Copy)]
-pub struct BlockImpact {
+pub(crate) struct BlockImpact {
     /// Speed of separation over speed of approach.
-    pub restitution: f64,
+    pub(crate) restitution: f64,
     /// Ball's speed after over block's speed before.
-    pub speed_ratio: f64,
+    pub(crate) speed_ratio: f64,
     /// Largest kinetic energy at any later step over the energy before.
-    pub energy_ratio: f64,
+    pub(crate) energy_ratio: f64,
 }
 
 /// A block of `mass` (kg) at `speed` (m/s) onto a ball at rest; `phase` in [0, 1) shifts the start by that share of
 /// the way of one far step.
-pub fn block_impact(settings: &WorldSettings, mass: f64, speed: f64, phase: f64) -> BlockImpact {
+pub(crate) fn block_impact(settings: &WorldSettings, mass: f64, speed: f64, phase: f64) -> BlockImpact {
     let ([k, b], [d0, d1, w, _, _]) = (solref(&settings.impact), SOLIMP);
     let (ball, step) = (settings.ball, settings.step);
     let inertia = 2.0 / 3.0 * ball.mass * ball.radius * ball.radius;

@@ -1,0 +1,3 @@
+//! Integration tests of retargeting, one binary.
+
+mod kinematic;
