@@ -1,10 +1,9 @@
 //! One cell of the benchmark: one engine, robot, scenario and seed; every case planned, tried and measured.
 //!
-//! The engine sees the request and the sensors; the world and its truth stay here. Wall time is measured here too and
-//! is the only thing in a result that differs from run to run.
+//! The engine sees the request and the sensors; the world and its truth stay here. The time that plans and ticks take on
+//! a core is measured here too, and is the only thing in a result that differs from run to run.
 
 use std::sync::Arc;
-use std::time::Instant;
 
 use instep_kick::{KickEngine, Refusal};
 use instep_robot::control::{Controller, JointCommand, Sensors};
@@ -14,6 +13,7 @@ use instep_sim::{BallState, World};
 use serde::{Deserialize, Serialize};
 
 use crate::BenchError;
+use crate::cpu::thread_seconds;
 use crate::engines::Subject;
 use crate::scenario::{Case, Scenario};
 
@@ -81,9 +81,9 @@ struct Timed<'a> {
 
 impl Controller for Timed<'_> {
     fn tick(&mut self, sensors: &Sensors, command: &mut JointCommand) {
-        let start = Instant::now();
+        let start = thread_seconds();
         self.engine.tick(sensors, command);
-        self.times.push(start.elapsed().as_secs_f32());
+        self.times.push((thread_seconds() - start) as f32);
     }
 }
 
@@ -151,9 +151,9 @@ pub fn run_case(
     let mut sensors = Sensors::default();
     suite.read_into(0.0, &mut sensors);
 
-    let start = Instant::now();
+    let start = thread_seconds();
     let planned = engine.plan(&case.request, &sensors);
-    let plan_time = start.elapsed().as_secs_f64();
+    let plan_time = thread_seconds() - start;
     let plan = match planned {
         Ok(plan) => plan,
         Err(refusal) => return Ok((Err(refusal), plan_time, None)),

@@ -39,6 +39,15 @@ impl Subject {
         Ok(Self::new(robot, dynamic))
     }
 
+    /// For a loaded robot, with the engine's settings from its folder.
+    ///
+    /// # Errors
+    /// When the engine's settings cannot be read.
+    pub fn of(robot: Robot) -> Result<Self, BenchError> {
+        let dynamic = DynamicSettings::load(robot.model_file().parent().unwrap_or(Path::new(".")))?;
+        Ok(Self::new(Arc::new(robot), dynamic))
+    }
+
     /// For a robot and its settings.
     #[must_use]
     pub fn new(robot: Arc<Robot>, dynamic: DynamicSettings) -> Self {

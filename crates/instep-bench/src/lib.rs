@@ -6,10 +6,11 @@
 //! - [`run`]: all cells on all cores, with a file to resume from.
 //! - [`table`] and [`page`]: Markdown, CSV, JSON and HTML.
 //!
-//! One world a thread; but for wall times the same cells give the same results on any number of threads. Engines see
+//! One world a thread; but for the times that plans and ticks take the same cells give the same results on any number of threads. Engines see
 //! requests and sensors only.
 
 pub mod cell;
+pub mod cpu;
 pub mod engines;
 mod error;
 pub mod page;

@@ -82,6 +82,8 @@ pub struct ModelRange {
     pub mass: Option<Range>,
     /// Shift of the base link's centre of mass forward, share of the leg length.
     pub base_forward: Option<Range>,
+    /// The same to the left.
+    pub base_left: Option<Range>,
     /// Dry friction of joints, share of the torque limit.
     pub joint_friction: Option<Range>,
 }
@@ -186,6 +188,7 @@ impl Scenario {
             ("pitch.softness", self.pitch.softness),
             ("model.mass", self.model.mass),
             ("model.base_forward", self.model.base_forward),
+            ("model.base_left", self.model.base_left),
             ("model.joint_friction", self.model.joint_friction),
             ("disturbance.push", d.push),
             ("disturbance.push_before", d.push_before),
@@ -249,7 +252,11 @@ impl Scenario {
         let pitch = [one(self.pitch.friction), one(self.pitch.softness)];
         let model = ModelError {
             mass: one(self.model.mass).unwrap_or(1.0),
-            base_shift: [one(self.model.base_forward).unwrap_or(0.0) * size.leg, 0.0, 0.0],
+            base_shift: [
+                one(self.model.base_forward).unwrap_or(0.0) * size.leg,
+                one(self.model.base_left).unwrap_or(0.0) * size.leg,
+                0.0,
+            ],
             joint_friction: one(self.model.joint_friction).unwrap_or(0.0),
         };
         // Two normal numbers by Box and Muller.

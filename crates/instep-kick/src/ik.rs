@@ -30,8 +30,10 @@ const STEP: f64 = 0.4;
 pub struct Weights {
     /// Swing sole's position, 1/m.
     pub position: f64,
-    /// Swing sole's orientation, 1/rad.
+    /// Swing sole's pitch and yaw, 1/rad.
     pub orientation: f64,
+    /// Swing sole's roll, 1/rad: in the air it may lean.
+    pub roll: f64,
     /// Base height, 1/m.
     pub height: f64,
     /// Base roll and pitch, 1/rad.
@@ -46,7 +48,7 @@ pub struct Weights {
 
 impl Default for Weights {
     fn default() -> Self {
-        Self { position: 100.0, orientation: 30.0, height: 4.0, tilt: 8.0, yaw: 0.8, balance: 60.0, damping: 0.03 }
+        Self { position: 100.0, orientation: 30.0, roll: 8.0, height: 4.0, tilt: 3.0, yaw: 0.8, balance: 60.0, damping: 0.03 }
     }
 }
 
@@ -70,8 +72,10 @@ pub struct Goals {
 pub struct Residual {
     /// Swing sole's position, m.
     pub position: f64,
-    /// Swing sole's orientation, rad.
+    /// Swing sole's pitch and yaw, rad.
     pub orientation: f64,
+    /// Swing sole's roll, rad.
+    pub roll: f64,
     /// Centre of mass, m.
     pub balance: f64,
     /// Base tilt, rad.
@@ -177,22 +181,46 @@ impl Ik {
     ) -> Residual {
         tree.update(angles, pose);
         let mut residual = self.linearise(tree, pose, swing, goals);
+        let mut cost = self.cost();
+        let mut damping = self.weights.damping;
         for _ in 0..steps {
-            self.least_squares(angles);
-            let mut largest: f64 = 0.0;
-            for (joints, step) in self.unknowns.iter().zip(&self.step) {
-                largest = largest.max(step.abs());
-                for joint in joints.iter().flatten() {
-                    angles[*joint] += step;
-                }
-            }
+            self.least_squares(angles, damping);
+            let step = self.step;
+            let largest = step.iter().fold(0.0_f64, |most, s| most.max(s.abs()));
+            self.apply(&step, 1.0, angles);
             tree.update(angles, pose);
-            residual = self.linearise(tree, pose, swing, goals);
+            let before = (self.jacobian, self.error);
+            let next = self.linearise(tree, pose, swing, goals);
+            let next_cost = self.cost();
+            // Levenberg and Marquardt: a step that makes things worse is taken back and damped.
+            if next_cost > cost * 1.000_001 && largest > 1e-3 {
+                self.apply(&step, -1.0, angles);
+                tree.update(angles, pose);
+                (self.jacobian, self.error) = before;
+                damping = (damping * 10.0).max(1.0);
+                continue;
+            }
+            damping = (damping * 0.2).max(self.weights.damping);
+            (residual, cost) = (next, next_cost);
             if largest < 1e-5 {
                 break;
             }
         }
         residual
+    }
+
+    /// Adds `share` of a step to the angles.
+    fn apply(&self, step: &[f64; UNKNOWNS], share: f64, angles: &mut [f64]) {
+        for (joints, step) in self.unknowns.iter().zip(step) {
+            for joint in joints.iter().flatten() {
+                angles[*joint] += share * step;
+            }
+        }
+    }
+
+    /// What is minimised.
+    fn cost(&self) -> f64 {
+        self.error.iter().map(|e| e * e).sum()
     }
 
     /// Jacobian and error in the present pose.
@@ -209,7 +237,9 @@ impl Ik {
         let com = turn * (com_base - s);
         let wanted = Rotation3::from_axis_angle(&Vector3::z_axis(), goals.yaw_pitch[0])
             * Rotation3::from_axis_angle(&Vector3::y_axis(), goals.yaw_pitch[1]);
-        let orientation_error = log(&(wanted.into_inner() * (turn * pose.rotation[flying.link]).transpose()));
+        // In the swing sole's own axes, so that its roll can weigh less.
+        let foot = (turn * pose.rotation[flying.link]).transpose();
+        let orientation_error = foot * log(&(wanted.into_inner() * (turn * pose.rotation[flying.link]).transpose()));
         let [roll, pitch, yaw] = goals.base;
         let base_error = log(&(Rotation3::from_euler_angles(roll, pitch, yaw).into_inner() * turn.transpose()));
         let position_error = goals.position - position;
@@ -218,7 +248,10 @@ impl Ik {
 
         for k in 0..3 {
             self.error[k] = w.position * position_error[k];
-            self.error[3 + k] = w.orientation * orientation_error[k];
+        }
+        let orientation = [w.roll, w.orientation, w.orientation];
+        for k in 0..3 {
+            self.error[3 + k] = orientation[k] * orientation_error[k];
         }
         self.error[6] = w.height * height_error;
         self.error[7] = w.tilt * base_error.x;
@@ -237,13 +270,13 @@ impl Ik {
                 let v_c = tree.com_column(pose, joint);
                 // d/dt R^T (p - s) = R^T (v - v_s - omega_s x (p - s)).
                 let d_position = turn * (v_f - v_s - omega_s.cross(&(f - s)));
-                let d_orientation = turn * (omega_f - omega_s);
+                let d_orientation = foot * (turn * (omega_f - omega_s));
                 let d_base = turn * (-v_s + omega_s.cross(&s));
                 let d_tilt = -(turn * omega_s);
                 let d_com = turn * (v_c - v_s - omega_s.cross(&(com_base - s)));
                 for k in 0..3 {
                     column[k] += w.position * d_position[k];
-                    column[3 + k] += w.orientation * d_orientation[k];
+                    column[3 + k] += orientation[k] * d_orientation[k];
                 }
                 column[6] += w.height * d_base.z;
                 column[7] += w.tilt * d_tilt.x;
@@ -258,7 +291,8 @@ impl Ik {
         }
         Residual {
             position: position_error.norm(),
-            orientation: orientation_error.norm(),
+            orientation: orientation_error.yz().norm(),
+            roll: orientation_error.x.abs(),
             balance: balance_error[0].hypot(balance_error[1]),
             tilt: base_error.xy().norm(),
             height: height_error.abs(),
@@ -266,7 +300,7 @@ impl Ik {
     }
 
     /// The box-constrained damped least-squares step, into `self.step`.
-    fn least_squares(&mut self, angles: &[f64]) {
+    fn least_squares(&mut self, angles: &[f64], damping: f64) {
         let n = self.unknowns.len();
         for i in 0..n {
             for j in 0..=i {
@@ -274,7 +308,7 @@ impl Ik {
                 self.normal[i][j] = sum;
                 self.normal[j][i] = sum;
             }
-            self.normal[i][i] += self.weights.damping;
+            self.normal[i][i] += damping;
             self.gradient[i] = (0..ROWS).map(|r| self.jacobian[r][i] * self.error[r]).sum();
         }
         let mut fixed = [false; UNKNOWNS];

@@ -4,6 +4,7 @@
 //! 1, it could not; 2, something handed in cannot be used: one message on standard error says what and what would be
 //! right, and nothing was written.
 
+mod bench;
 mod failure;
 mod figure;
 mod files;
@@ -33,7 +34,9 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Let a robot play a kick reference against a ball, and measure what happens
+    /// Measure engines, robots and scenarios against each other in one table
+    Bench(bench::Bench),
+    /// Let a robot kick a ball, from a reference or by an engine, and measure what happens
     Kick(kick::Kick),
     /// Turn a human kick (ASF/AMC or BVH) into a reference for a robot
     Retarget(retarget::Retarget),
@@ -47,6 +50,7 @@ fn main() -> ExitCode {
     let cli = Cli::parse();
     let output = Output::new(cli.json);
     let done = match cli.command {
+        Command::Bench(bench) => bench.run(&output),
         Command::Kick(kick) => kick.run(&output),
         Command::Retarget(retarget) => retarget.run(&output),
         Command::Robot(command) => command.run(&output),

@@ -45,6 +45,15 @@ pub(crate) fn reference(path: &Path) -> Result<PathBuf, Failure> {
     existing_file("--reference", found.as_deref().unwrap_or(path), "a reference (JSON), as `instep retarget` writes it")
 }
 
+/// The folder of KickBench's scenarios.
+///
+/// # Errors
+/// When there is none.
+pub(crate) fn scenarios() -> Result<PathBuf, Failure> {
+    find(Path::new("scenarios"))
+        .ok_or_else(|| Failure::input("scenarios/: no such folder; run from the project's folder"))
+}
+
 /// The `robot.toml` of the robot called `name`, if that is a plain name and there is one.
 fn shipped(name: &Path) -> Option<PathBuf> {
     let is_name = name.components().count() == 1 && name.file_name().is_some();

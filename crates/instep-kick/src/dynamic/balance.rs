@@ -64,12 +64,21 @@ impl Balance {
     }
 
     /// Shift of the centre of mass, m, from the measured and the planned centre of pressure in the support sole's frame.
-    pub(crate) fn shift(&mut self, measured: Option<[f64; 2]>, planned: [f64; 2], active: bool, dt: f64) -> [f64; 2] {
+    /// `active`: a kick is under way; `steady`: the support foot stands flat.
+    pub(crate) fn shift(
+        &mut self,
+        measured: Option<[f64; 2]>,
+        planned: [f64; 2],
+        (active, steady): (bool, bool),
+        dt: f64,
+    ) -> [f64; 2] {
         if !self.settings.on {
             return [0.0; 2];
         }
         let measured = measured.filter(|m| active && m.iter().chain(&planned).all(|v| v.is_finite()));
         let wanted = match measured {
+            // While the foot rocks on an edge its centre of pressure says nothing of the body's place.
+            Some(_) if !steady => self.first,
             Some(measured) => [-self.x.step(measured[0] - planned[0], dt), -self.y.step(measured[1] - planned[1], dt)],
             // Nothing to control: the integral fades within about a third of a second.
             None => {
@@ -128,10 +137,10 @@ mod tests {
             on: true, x: pid, y: pid, filter: 0.0, tilt: 1.0, rate: 0.1, moment: 0.5, follow_ball: false,
         };
         let mut balance = Balance::new(on);
-        let shift = balance.shift(Some([0.02, -0.01]), [0.0, 0.0], true, 0.01);
+        let shift = balance.shift(Some([0.02, -0.01]), [0.0, 0.0], (true, true), 0.01);
         assert!(shift[0] < 0.0 && shift[1] > 0.0);
-        assert_eq!(Balance::new(Feedback { on: false, ..on }).shift(Some([0.02, 0.0]), [0.0; 2], true, 0.01), [0.0; 2]);
-        let nan = balance.shift(Some([f64::NAN, 0.0]), [0.0; 2], true, 0.01);
+        assert_eq!(Balance::new(Feedback { on: false, ..on }).shift(Some([0.02, 0.0]), [0.0; 2], (true, true), 0.01), [0.0; 2]);
+        let nan = balance.shift(Some([f64::NAN, 0.0]), [0.0; 2], (true, true), 0.01);
         assert!(nan.iter().all(|s| s.is_finite()));
     }
 }

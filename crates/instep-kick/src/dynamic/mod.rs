@@ -11,6 +11,7 @@
 
 mod balance;
 mod body;
+mod follow;
 pub mod foot;
 mod motion;
 mod path;
@@ -32,6 +33,7 @@ use crate::request::{KickRequest, Refusal};
 use crate::tree::TreePose;
 use balance::Balance;
 use body::Body;
+use follow::Follow;
 use motion::{Motion, Stroke};
 use plan::Planner;
 use torque::Dynamics;
@@ -42,6 +44,12 @@ pub use settings::{
 
 /// Steps of inverse kinematics in a tick.
 const TICK_STEPS: usize = 3;
+/// The same in a check of a new stroke.
+const PROBE_STEPS: usize = 10;
+/// Tilt up to which the support foot counts as flat, rad.
+const STEADY_TILT: f64 = 0.04;
+/// Distance of the centre of pressure from the foot's edge from which on the foot counts as rocking, m.
+const EDGE: f64 = 0.006;
 /// Load (share of the weight) from which a foot's centre of pressure counts.
 const LOADED: f64 = 0.1;
 
@@ -70,6 +78,10 @@ pub struct DynamicKick {
     hold: bool,
     cancel: bool,
     planned_cop: [f64; 2],
+    follow: Option<Follow>,
+    /// Scratch of the follower's checks.
+    probe: TreePose,
+    probe_angles: Vec<f64>,
 }
 
 impl DynamicKick {
@@ -101,6 +113,9 @@ impl DynamicKick {
             balance,
             now: pose.clone(),
             held: pose.clone(),
+            probe: pose.clone(),
+            probe_angles: angles.clone(),
+            follow: None,
             pose,
             held_angles: angles.clone(),
             angles,
@@ -151,6 +166,52 @@ impl DynamicKick {
         self.planned_cop
     }
 
+    /// Follows a ball that is seen to move during the wind-up; `ahead` (s) is the time of the newest sample.
+    fn follow(&mut self, sensors: &Sensors, ahead: f64) {
+        let (Some(mut follow), Some(stroke)) = (self.follow, self.stroke) else { return };
+        let time = self.clock + ahead;
+        let phase = self.motion.phase(time);
+        if !matches!(self.status, KickStatus::Running | KickStatus::Holding) || phase > Phase::WindUp {
+            self.follow = None;
+            return;
+        }
+        let swing = stroke.swing;
+        if let Some(ball) = sensors.ball {
+            let sole = &self.body.robot.leg(swing.other()).sole;
+            let turn = self.now.rotation[sole.link].transpose();
+            let base = turn * (-self.now.point(sole));
+            let yaw = turn[(1, 0)].atan2(turn[(0, 0)]);
+            follow.see(ball.time, [ball.position[0], ball.position[1]], base.xy(), yaw);
+        }
+        if phase == Phase::WindUp {
+            follow.propose(&stroke);
+            if let Some((candidate, ball, good)) = follow.candidate {
+                let places = [candidate.contact, candidate.windup_point(), candidate.follow_point()];
+                if good < places.len() {
+                    let place = places[good];
+                    let foot = [place.x, place.y, place.z, candidate.yaw, 0.0];
+                    let trunk = motion::trunk_support(&self.body, &self.settings, swing, candidate.yaw);
+                    let goals = motion::goals(&foot, &trunk);
+                    if good == 0 {
+                        self.probe_angles.copy_from_slice(&self.angles);
+                        self.body.set_arms(1.0, &mut self.probe_angles);
+                    }
+                    let tree = &self.body.tree;
+                    let residual =
+                        self.ik.solve(tree, &mut self.probe, &mut self.probe_angles, swing, &goals, PROBE_STEPS);
+                    let limits = &self.settings.limits;
+                    let fine = plan::miss(&residual) < limits.reach && tree.least_gap(&self.probe).0 >= limits.clearance;
+                    follow.candidate = fine.then_some((candidate, ball, good + 1));
+                } else {
+                    self.motion = self.motion.retargeted(&self.body, &self.settings, time, &candidate);
+                    self.stroke = Some(candidate);
+                    follow.accept(ball);
+                }
+            }
+        }
+        self.follow = Some(follow);
+    }
+
     fn running(&self) -> bool {
         matches!(self.status, KickStatus::Running | KickStatus::Holding | KickStatus::Cancelling)
     }
@@ -183,15 +244,28 @@ impl DynamicKick {
         (sum > least).then(|| moment.map(|m| m / sum))
     }
 
+    /// Whether a centre of pressure is well inside the support foot, toward the swing foot without limit.
+    fn inside(&self, at: [f64; 2], support: Side) -> bool {
+        let foot = &self.body.feet[support as usize];
+        let [back, front] = foot.stand_x;
+        let outer = if support == Side::Left { foot.stand_y[1] - at[1] } else { at[1] - foot.stand_y[0] };
+        at[0] - back > EDGE && front - at[0] > EDGE && outer > EDGE
+    }
+
+    /// How far the base leans from the plan: a rotation vector in the base frame, rad, without yaw.
+    fn tilt(&self, sensors: &Sensors) -> Vector3<f64> {
+        let [w, x, y, z] = sensors.orientation;
+        let measured = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
+        let sole = &self.body.robot.leg(self.motion.swing.other()).sole;
+        let up = measured.inverse() * Vector3::z();
+        let wanted = self.now.rotation[sole.link] * Vector3::z();
+        up.cross(&wanted)
+    }
+
     /// The moment of the inertial sensor's loop on the body, in the base frame, N m.
     fn inertial(&self, sensors: &Sensors) -> Vector3<f64> {
         let swing = self.motion.swing;
-        let [w, x, y, z] = sensors.orientation;
-        let measured = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
-        let sole = &self.body.robot.leg(swing.other()).sole;
-        let up = measured.inverse() * Vector3::z();
-        let wanted = self.now.rotation[sole.link] * Vector3::z();
-        let tilt = up.cross(&wanted);
+        let tilt = self.tilt(sensors);
         let rate = Vector3::from(sensors.gyro);
         let com = self.body.stand(swing).com;
         let weight = self.body.tree.mass() * 9.81;
@@ -214,6 +288,7 @@ impl Controller for DynamicKick {
                 self.hold = false;
             }
         }
+        self.follow(sensors, ahead);
         let waits = self.hold && self.clock + ahead >= self.motion.end_of(Phase::WindUp) - 1e-9;
         if self.running() {
             self.status = match self.status {
@@ -233,7 +308,9 @@ impl Controller for DynamicKick {
         let swing = self.motion.swing;
         let both = self.motion.both_feet(self.clock);
         let measured = self.measured(sensors);
-        let shift = self.balance.shift(measured, self.planned_cop, self.running(), dt);
+        let tilt = self.tilt(sensors);
+        let steady = tilt.norm() < STEADY_TILT && measured.is_none_or(|at| self.inside(at, swing.other()));
+        let shift = self.balance.shift(measured, self.planned_cop, (self.running(), steady), dt);
         // The plan, without feedback: its differences give speeds and torques that feedback must not shake.
         let goals = self.motion.goals(self.clock + ahead);
         self.body.set_arms(self.motion.arms(self.clock + ahead), &mut self.angles);
@@ -288,6 +365,11 @@ impl KickEngine for DynamicKick {
         self.stroke = Some(planned.stroke);
         self.request = Some(*request);
         self.clock = 0.0;
+        let swing = planned.stroke.swing;
+        let resting = request.ball_velocity.iter().all(|v| v.abs() < 0.02);
+        let target = self.body.support_from_footprint(swing, request.ball).into();
+        let follows = self.settings.feedback.on && self.settings.feedback.follow_ball && resting;
+        self.follow = follows.then(|| Follow::new(target));
         self.status = KickStatus::Running;
         self.hold = request.hold;
         self.cancel = false;

@@ -22,7 +22,9 @@ use crate::request::{KickRequest, Place, Refusal, Strength};
 use crate::tree::TreePose;
 
 /// Steps of inverse kinematics to a place that is far from the last.
-const FAR: usize = 8;
+const FAR: usize = 12;
+/// The same to a place a hand's breadth away.
+const MIDDLE: usize = 8;
 /// The same to a place near the last.
 const NEAR: usize = 3;
 /// Sampling of the forecast, s: in the kick, and elsewhere.
@@ -63,8 +65,8 @@ pub(crate) struct Planner {
 }
 
 /// Distance that a residual counts as, m: 1 rad is 0.1 m.
-fn miss(residual: &Residual) -> f64 {
-    residual.position + 0.1 * residual.orientation + 0.5 * residual.balance
+pub(crate) fn miss(residual: &Residual) -> f64 {
+    residual.position + 0.1 * residual.orientation + 0.03 * residual.roll + 0.5 * residual.balance
 }
 
 /// Angle in (-pi, pi].
@@ -158,7 +160,6 @@ impl Planner {
                 match self.screen(body, settings, request, (ball, velocity), swing, (face, turn)) {
                     Some(Ok(candidate)) => candidates[count] = Some(candidate),
                     Some(Err(cause)) => {
-                        if std::env::var("KICK_DEBUG").is_ok() { eprintln!("{swing} {face:?}: {cause}"); }
                         refusal = Some(graver(refusal, cause));
                     }
                     None => {}
@@ -188,7 +189,6 @@ impl Planner {
                     return Ok(Planned { motion, stroke: candidate.stroke, plan });
                 }
                 Err(cause) => {
-                        if std::env::var("KICK_DEBUG").is_ok() { eprintln!("forecast {:?}: {cause}", candidate.stroke); }
                     refusal = Some(graver(refusal, cause))
                 },
             }
@@ -277,21 +277,20 @@ impl Planner {
 
         // The longest wind-up and follow-through there is room for.
         let mut failure = None;
-        let shares = [1.0, 0.5, 0.0];
-        let fits = shares.into_iter().find_map(|share| {
+        let fits = [1.0, 0.8, 0.6, 0.4, 0.2, 0.0].into_iter().find_map(|share| {
             stroke.windup = s.windup_least + share * (s.windup - s.windup_least);
             self.angles.copy_from_slice(&self.saved);
             let place = stroke.windup_point();
-            self.reach(body, settings, &stroke, place, Place::WindUp, FAR).map_err(|e| failure = Some(e)).ok()
+            self.reach(body, settings, &stroke, place, Place::WindUp, MIDDLE).map_err(|e| failure = Some(e)).ok()
         });
         if fits.is_none() {
             return failure.map(Err);
         }
-        let fits = shares.into_iter().find_map(|share| {
+        let fits = [1.0, 0.5, 0.0].into_iter().find_map(|share| {
             stroke.follow = s.follow * (0.3 + 0.7 * share);
             self.angles.copy_from_slice(&self.saved);
             let place = stroke.follow_point();
-            self.reach(body, settings, &stroke, place, Place::FollowThrough, FAR).map_err(|e| failure = Some(e)).ok()
+            self.reach(body, settings, &stroke, place, Place::FollowThrough, MIDDLE).map_err(|e| failure = Some(e)).ok()
         });
         if fits.is_none() {
             return failure.map(Err);

@@ -1,0 +1,54 @@
+//! A tick allocates nothing, in no phase, and neither do the ticks after a cancel.
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+
+use instep_kick::KickEngine;
+use instep_robot::control::{Controller, JointCommand};
+
+use crate::rig::{engine, request, robot, standing};
+
+struct Counting;
+
+thread_local! {
+    static COUNT: Cell<usize> = const { Cell::new(0) };
+}
+
+// SAFETY: every call goes to the system's allocator; counting touches a constant-initialised thread-local only.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        let _ = COUNT.try_with(|count| count.set(count.get() + 1));
+        // SAFETY: the caller's promise is passed on.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: as above.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+#[test]
+fn a_tick_allocates_nothing() {
+    for name in ["nao", "wolfgang"] {
+        for cancel in [false, true] {
+            let robot = robot(name);
+            let mut engine = engine(name);
+            let mut sensors = standing(&robot);
+            let mut command = JointCommand::zeros(robot.joints.len());
+            let plan = engine.plan(&request(name), &sensors).unwrap();
+            let before = COUNT.get();
+            while sensors.time < plan.duration + 0.5 {
+                if cancel && sensors.time > 0.9 * plan.contact {
+                    engine.cancel();
+                }
+                engine.tick(&sensors, &mut command);
+                sensors.time += engine.control_period();
+            }
+            assert_eq!(COUNT.get(), before, "{name} allocated in a tick");
+        }
+    }
+}

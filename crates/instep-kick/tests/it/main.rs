@@ -1,0 +1,9 @@
+//! Tests of the kick engines against the robots that ship.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod allocation;
+mod cancel;
+mod issue_304;
+mod kinematics;
+mod refusals;
+mod rig;

@@ -1,0 +1,95 @@
+//! A robot in its world with an engine, ticked by hand.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use instep_kick::dynamic::DynamicKick;
+use instep_kick::{KickEngine, KickRequest};
+use instep_robot::Robot;
+use instep_robot::control::{JointCommand, Sensors};
+use instep_sim::sensors::SensorSuite;
+use instep_sim::settings::{Ball, WorldSettings};
+use instep_sim::{BallState, World};
+
+pub fn robot(name: &str) -> Arc<Robot> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots").join(name);
+    Arc::new(Robot::load(&folder).unwrap())
+}
+
+pub fn engine(name: &str) -> DynamicKick {
+    DynamicKick::load(robot(name)).unwrap()
+}
+
+/// Sensors of the robot standing still.
+pub fn standing(robot: &Robot) -> Sensors {
+    Sensors {
+        joint_positions: robot.stand[7..].to_vec(),
+        joint_velocities: vec![0.0; robot.joints.len()],
+        orientation: [1.0, 0.0, 0.0, 0.0],
+        contact_forces: vec![9.81 * robot.mass() / robot.contacts.len() as f64; robot.contacts.len()],
+        centre_of_pressure: [Some([0.0, 0.0]); 2],
+        ..Sensors::default()
+    }
+}
+
+/// A request that both small robots can do.
+pub fn request(name: &str) -> KickRequest {
+    match name {
+        "nao" => KickRequest::new([0.17, -0.05], 0.0, 0.7),
+        _ => KickRequest::new([0.24, -0.07], 0.0, 0.8),
+    }
+}
+
+pub struct Rig {
+    pub engine: DynamicKick,
+    pub world: World,
+    suite: SensorSuite,
+    pub sensors: Sensors,
+    pub command: JointCommand,
+    far: usize,
+}
+
+impl Rig {
+    pub fn new(name: &str, ball: [f64; 2]) -> Self {
+        let engine = engine(name);
+        let robot = robot(name);
+        let model = engine.settings().ball;
+        let mut settings =
+            WorldSettings { ball: Ball { mass: model.mass, radius: model.radius }, ..WorldSettings::default() };
+        settings.step.near_distance = 0.02;
+        let mut world = World::new(Arc::clone(&robot), &settings).unwrap();
+        let foot = engine.footprint_from_base();
+        let at = [ball[0] - foot[0], ball[1] - foot[1], model.radius];
+        world.reset(&robot.stand, &vec![0.0; robot.nv()], &BallState::at_rest(at)).unwrap();
+        let mut suite = SensorSuite::new(&world, 1);
+        suite.sense(&world);
+        let mut sensors = Sensors::default();
+        suite.read_into(0.0, &mut sensors);
+        let far = (engine.control_period() / settings.step.far).round() as usize;
+        Self { engine, world, suite, sensors, command: JointCommand::zeros(robot.joints.len()), far }
+    }
+
+    /// One control period.
+    pub fn tick(&mut self) {
+        use instep_robot::control::Controller;
+        self.suite.read_into(self.world.time(), &mut self.sensors);
+        self.engine.tick(&self.sensors, &mut self.command);
+        for _ in 0..self.far {
+            self.world.advance(&self.command, None).unwrap();
+            self.suite.sense(&self.world);
+        }
+    }
+
+    /// Whether the robot stands on both feet in its standing pose.
+    pub fn stands(&self) -> bool {
+        let robot = self.world.robot();
+        let mut forces = vec![nalgebra::Vector3::zeros(); robot.contacts.len()];
+        self.world.contact_forces_into(&mut forces);
+        let mut loads = [0.0; 2];
+        for (contact, force) in robot.contacts.iter().zip(&forces) {
+            loads[contact.leg as usize] += force.z;
+        }
+        let near = self.world.q()[7..].iter().zip(&robot.stand[7..]).all(|(a, b)| (a - b).abs() < 0.1);
+        near && self.world.q()[2] > 0.95 * robot.stand[2] && loads.iter().all(|load| *load > 0.2 * 9.81 * robot.mass())
+    }
+}

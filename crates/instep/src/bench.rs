@@ -1,0 +1,124 @@
+//! `instep bench`: KickBench. Engines x robots x scenarios x seeds to one table, on all cores, stopped and resumed at will.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use instep_bench::table::{csv, json, markdown, rows};
+use instep_bench::{Bench as KickBench, BenchError, Scenario, Subject, page, table::rows_over_seeds};
+
+use crate::failure::Failure;
+use crate::output::Output;
+use crate::{files, places};
+
+/// The arguments of `instep bench`.
+#[derive(Debug, Args)]
+pub(crate) struct Bench {
+    /// Engines, separated by commas
+    #[arg(long, value_name = "ENGINE", value_delimiter = ',', default_value = "dynamic,dynamic-open")]
+    engine: Vec<String>,
+    /// Robots, separated by commas
+    #[arg(long, value_name = "ROBOT", value_delimiter = ',', default_value = "nao,wolfgang")]
+    robot: Vec<String>,
+    /// Scenarios by name, separated by commas [default: all that are in scenarios/]
+    #[arg(long, value_name = "SCENARIO", value_delimiter = ',')]
+    scenario: Vec<String>,
+    /// Requests of each scenario and seed [default: 200]
+    #[arg(long, value_name = "N")]
+    requests: Option<usize>,
+    /// Number of seeds, counted from 1 [default: 3]
+    #[arg(long, value_name = "N")]
+    seeds: Option<u64>,
+    /// One seed and 20 requests, in place of three seeds and 200
+    #[arg(long)]
+    quick: bool,
+    /// Folder for bench.md, bench.csv, bench.json and bench.html
+    #[arg(long, value_name = "FOLDER", default_value = "out/bench")]
+    out: PathBuf,
+    /// File that keeps finished cells: a run that was stopped goes on from there
+    #[arg(long, value_name = "FILE")]
+    resume: Option<PathBuf>,
+}
+
+impl From<BenchError> for Failure {
+    fn from(error: BenchError) -> Self {
+        match error {
+            BenchError::Sim(error) => error.into(),
+            other => Self::input(other),
+        }
+    }
+}
+
+impl Bench {
+    /// Runs the command.
+    ///
+    /// # Errors
+    /// When a name is not known, a file cannot be used, or a simulation diverges.
+    pub(crate) fn run(self, output: &Output) -> Result<ExitCode, Failure> {
+        let bench = self.bench()?;
+        let names = ["bench.md", "bench.csv", "bench.json", "bench.html"].map(|name| self.out.join(name));
+        for file in &names {
+            files::check_file(file)?;
+        }
+        let bar = ProgressBar::new(bench.cells().len() as u64);
+        if let Ok(style) = ProgressStyle::with_template("{wide_bar} {pos}/{len} {msg} {eta}") {
+            bar.set_style(style);
+        }
+        let cells = bench.run(self.resume.as_deref(), &|done, _, key| {
+            bar.set_position(done as u64);
+            bar.set_message(format!("{} {} {}", key.engine, key.robot, key.scenario));
+        })?;
+        bar.finish_and_clear();
+
+        let (each, all) = (rows(&cells), rows_over_seeds(&cells));
+        let text = markdown(&all);
+        let note = format!(
+            "{} requests and {} seeds a scenario. A ball speed counts only where its impact passed the audit; a hit is a \
+             ball that leaves at 0.3 of the asked speed or more. Times are those of one thread on its core.",
+            bench.requests,
+            bench.seeds.len()
+        );
+        let object = json(&each);
+        let mut batch = files::Batch::default();
+        let [md, comma, js, html] = &names;
+        let write = |path: PathBuf, text: &str| {
+            std::fs::write(&path, text)
+                .map_err(|e| Failure::input(format!("{}: cannot be written: {e}", path.display())))
+        };
+        write(batch.stage(md)?.to_owned(), &text)?;
+        write(batch.stage(comma)?.to_owned(), &csv(&each))?;
+        write(batch.stage(js)?.to_owned(), &object.to_string())?;
+        page::page(&all, vec![note]).save(batch.stage(html)?)?;
+        batch.commit()?;
+        output.show(&object, |_| text)?;
+        Ok(ExitCode::SUCCESS)
+    }
+
+    fn bench(&self) -> Result<KickBench, Failure> {
+        let folder = places::scenarios()?;
+        let mut scenarios = Scenario::load_all(&folder)?;
+        let known: Vec<String> = scenarios.iter().map(|scenario| scenario.name.clone()).collect();
+        if let Some(wrong) = self.scenario.iter().find(|name| !known.contains(name)) {
+            let known = known.join(", ");
+            return Err(BenchError::Unknown { kind: "scenario", found: wrong.clone(), known }.into());
+        }
+        scenarios.retain(|scenario| self.scenario.is_empty() || self.scenario.contains(&scenario.name));
+        let subjects = self
+            .robot
+            .iter()
+            .map(|name| Ok(Subject::of(places::robot(name)?)?))
+            .collect::<Result<Vec<_>, Failure>>()?;
+        for (subject, engine) in subjects.iter().flat_map(|s| self.engine.iter().map(move |e| (s, e))) {
+            subject.engine(engine)?;
+        }
+        let (requests, seeds) = if self.quick { (20, 1) } else { (200, 3) };
+        Ok(KickBench {
+            engines: self.engine.clone(),
+            subjects,
+            scenarios,
+            seeds: (1..=self.seeds.unwrap_or(seeds)).collect(),
+            requests: self.requests.unwrap_or(requests),
+        })
+    }
+}

@@ -1,0 +1,131 @@
+//! `instep kick --engine`: one request, or a file of them, planned by an engine and tried in the world.
+
+use std::path::Path;
+use std::process::ExitCode;
+
+use instep_bench::Subject;
+use instep_bench::cell::{Kicked, run_case};
+use instep_bench::scenario::{Case, Scenario};
+use instep_kick::{KickRequest, Strength};
+use instep_sim::World;
+use instep_sim::settings::{ModelError, SensorNoise, WorldSettings};
+use serde::Serialize;
+
+use crate::failure::Failure;
+use crate::output::Output;
+
+/// What `--json` prints for each request.
+#[derive(Debug, Serialize)]
+struct Answer {
+    request: KickRequest,
+    /// The refusal, or null.
+    refused: Option<Refused>,
+    /// What came of an accepted request.
+    kicked: Option<Kicked>,
+    direction_error_deg: Option<f64>,
+    plan_s: f64,
+}
+
+#[derive(Debug, Serialize)]
+struct Refused {
+    cause: &'static str,
+    message: String,
+}
+
+/// One request of the command line.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Wanted {
+    pub(super) ball: [f64; 2],
+    /// rad
+    pub(super) direction: f64,
+    /// Ball speed, m/s.
+    pub(super) speed: f64,
+}
+
+/// Runs `requests` one after the other, each from the stand.
+///
+/// # Errors
+/// When engine or world cannot be made, or a simulation diverges. A refusal is an answer.
+pub(super) fn run(
+    subject: &Subject,
+    engine: &str,
+    requests: &[KickRequest],
+    world: Option<WorldSettings>,
+    seed: u64,
+    output: &Output,
+) -> Result<ExitCode, Failure> {
+    let mut settings = world.unwrap_or_else(|| subject.world());
+    settings.ball = subject.world().ball;
+    let mut world = World::new(subject.robot.clone(), &settings)?;
+    let scenario = scenario(settings.sensors);
+    let mut answers = Vec::with_capacity(requests.len());
+    for request in requests {
+        let mut engine = subject.engine(engine)?;
+        let case = Case {
+            request: *request,
+            ball: request.ball.map(|v| if v.is_finite() { v } else { 1.0 }),
+            ball_velocity: request.ball_velocity.map(|v| if v.is_finite() { v } else { 0.0 }),
+            pitch: [None; 2],
+            model: ModelError::default(),
+            push: None,
+            ball_moved: None,
+            seed,
+        };
+        let (outcome, plan_s, _) = run_case(subject, &scenario, &case, engine.as_mut(), &mut world, &mut Vec::new())?;
+        let refused = outcome.as_ref().err().map(|r| Refused { cause: r.name(), message: r.to_string() });
+        let kicked = outcome.ok();
+        let direction_error_deg = kicked.and_then(|k| k.direction_error).map(f64::to_degrees);
+        answers.push(Answer { request: *request, refused, kicked, direction_error_deg, plan_s });
+    }
+    output.show(&serde_json::json!({ "requests": answers }), |_| answers.iter().map(line).collect())?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn line(answer: &Answer) -> String {
+    let [x, y] = answer.request.ball;
+    let place = format!("ball ({x:.3}, {y:.3}) m, {:.1} deg: ", answer.request.direction.to_degrees());
+    let Some(kicked) = &answer.kicked else {
+        let message = answer.refused.as_ref().map_or("", |refused| refused.message.as_str());
+        return format!("{place}refused: {message}\n");
+    };
+    let speed = kicked.ball_speed.map_or_else(
+        || if kicked.hit { "hit, speed not to be believed".into() } else { "missed".to_owned() },
+        |v| format!("{v:.2} m/s"),
+    );
+    let error = answer.direction_error_deg.map_or_else(String::new, |e| format!(", {e:+.1} deg off"));
+    let stands = if kicked.upright { "stands" } else { "fell" };
+    format!("{place}{speed}{error}, rolls {:.2} m, {stands}\n", kicked.distance)
+}
+
+fn scenario(sensors: SensorNoise) -> Scenario {
+    Scenario {
+        name: "request".into(),
+        title: String::new(),
+        ball: instep_bench::scenario::BallPlace { gap: [0.0; 2], lateral: [0.0; 2] },
+        kick: instep_bench::scenario::Kick { direction_deg: [0.0; 2], speed: [1.0; 2] },
+        sensors,
+        pitch: Default::default(),
+        model: Default::default(),
+        disturbance: Default::default(),
+    }
+}
+
+/// The requests of a file: a JSON array of requests, or one a line.
+///
+/// # Errors
+/// When the file cannot be read as such.
+pub(super) fn load(path: &Path) -> Result<Vec<KickRequest>, Failure> {
+    let wrong = |detail: String| Failure::input(format!("{}: {detail} (--requests)", path.display()));
+    let text = std::fs::read_to_string(path).map_err(|e| wrong(format!("cannot be read: {e}; expected JSON")))?;
+    if text.trim_start().starts_with('[') {
+        return serde_json::from_str(&text).map_err(|e| wrong(e.to_string()));
+    }
+    let lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
+    lines.map(|(i, line)| serde_json::from_str(line).map_err(|e| wrong(format!("line {}: {e}", i + 1)))).collect()
+}
+
+impl Wanted {
+    pub(super) fn request(self) -> KickRequest {
+        KickRequest { strength: Strength::BallSpeed(self.speed), ..KickRequest::new(self.ball, self.direction, 1.0) }
+    }
+}
