@@ -46,6 +46,7 @@ fn main() {
     number("--torque-margin", &mut settings.torque_margin);
     number("--q_i", &mut settings.weights.q_i[0]);
     number("--q_a", &mut settings.weights.q_a);
+    number("--q_j", &mut settings.weights.q_j);
     number("--q_m", &mut settings.weights.q_m);
     let robot = Robot::load(&root.join("robots").join(after("--robot").unwrap_or("prestoe".into()))).unwrap();
     let named: Vec<&str> = args.iter().map(String::as_str).filter(|a| a.starts_with("10_")).collect();

@@ -5,7 +5,7 @@ use super::node::View;
 use super::terms::{Family, Sink};
 
 /// Part of the range that is kept free at both ends, rad.
-const SPARE: f64 = 0.003;
+pub(crate) const SPARE: f64 = 0.003;
 
 /// The angle and its derivatives by the body's x and y.
 pub(crate) fn angle(ball: [f64; 2], body: [f64; 2]) -> (f64, [f64; 2]) {

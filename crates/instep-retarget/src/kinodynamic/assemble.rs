@@ -108,6 +108,8 @@ pub(crate) fn violations(solver: &Solver, worst: &Worst) -> BTreeMap<&'static st
                 Family::JointSpeed => value - settings.speed_margin,
                 Family::JointLimit => value - settings.joint_margin,
                 Family::SelfCollision => value - settings.clearance,
+                Family::Friction => value - super::friction::SPARE,
+                Family::ApproachAngle => value - approach::SPARE,
                 _ => value,
             };
             (family.name(), if real.is_nan() { f64::INFINITY } else { real.max(0.0) })

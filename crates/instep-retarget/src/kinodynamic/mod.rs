@@ -57,6 +57,7 @@ mod node;
 mod plan;
 mod regularisation;
 mod settings;
+mod smoothness;
 mod solver;
 mod strike;
 mod terms;

@@ -78,8 +78,6 @@ pub(crate) struct Plan<'a> {
     pub weight: f64,
     /// The clip's own time at node 0, s.
     pub clip_start: f64,
-    /// Frames of the clip a node.
-    pub stride: f64,
     /// By how much the world was turned about the ball so that the approach angle can be kept, rad.
     pub aim_turn: f64,
 }
@@ -180,7 +178,6 @@ impl<'a> Plan<'a> {
             ball,
             weight,
             clip_start: first / rate,
-            stride,
             aim_turn,
         };
         plan.schedule();
@@ -196,6 +193,7 @@ impl<'a> Plan<'a> {
             let own: Vec<usize> =
                 (0..self.robot.contacts.len()).filter(|&p| self.robot.contacts[p].leg == side).collect();
             let mut start = None;
+            self.fill_gaps(&own);
             for k in 0..=count {
                 let stands = k < count && own.iter().any(|&p| self.nodes[k].standing[p]);
                 match (start, stands) {
@@ -229,6 +227,28 @@ impl<'a> Plan<'a> {
             }
             self.nodes[k].pushing = pushing;
             self.nodes[k].holds = holds;
+        }
+    }
+
+    /// Lets the points of one foot that stand before and after a short flight of the foot stand during it too.
+    fn fill_gaps(&mut self, own: &[usize]) {
+        let most = (self.settings.min_gap / self.step).round() as usize;
+        let mut last: Option<usize> = None;
+        for k in 0..self.nodes.len() {
+            if !own.iter().any(|&p| self.nodes[k].standing[p]) {
+                continue;
+            }
+            if let Some(before) = last.filter(|&before| k - before > 1 && k - before - 1 <= most) {
+                let both: Vec<usize> = own
+                    .iter()
+                    .copied()
+                    .filter(|&p| self.nodes[before].standing[p] && self.nodes[k].standing[p])
+                    .collect();
+                for n in before + 1..k {
+                    both.iter().for_each(|&p| self.nodes[n].standing[p] = true);
+                }
+            }
+            last = Some(k);
         }
     }
 

@@ -26,7 +26,10 @@ pub struct KinodynamicWeights {
     pub q_target: f64,
     /// Joint and base acceleration, s^4/rad^2; not in the paper. Larger is smoother.
     pub q_a: f64,
-    /// Joint torques as shares of their limits; not in the paper. Larger keeps away from the limits.
+    /// Joint and base jerk, s^6/rad^2; not in the paper. Larger is smoother, and what holds at the nodes holds better
+    /// between them; much larger blunts the kick.
+    pub q_j: f64,
+    /// Joint torques as shares of their limits; not in the paper. Larger keeps away from the limits and costs time.
     pub q_tau: f64,
 }
 
@@ -41,7 +44,8 @@ impl Default for KinodynamicWeights {
             q_i: [0.02, 0.0, 0.0],
             q_target: 1.0,
             q_a: 2e-8,
-            q_tau: 1e-3,
+            q_j: 3e-9,
+            q_tau: 0.0,
         }
     }
 }
@@ -57,6 +61,9 @@ pub struct KinodynamicSettings {
     pub time_scale: f64,
     /// Weights of the costs.
     pub weights: KinodynamicWeights,
+    /// A foot that leaves the ground for less than this goes on standing, s; 0 to 0.3. Short gaps come from the contact
+    /// detection more often than from the human.
+    pub min_gap: f64,
     /// Coefficient of friction of the cone (10), 0.1 to 2. The cone is the pyramid inside of it.
     pub friction: f64,
     /// Least and greatest approach angle of (20), rad.
@@ -87,6 +94,7 @@ impl Default for KinodynamicSettings {
             rate: 120.0,
             time_scale: 1.0,
             weights: KinodynamicWeights::default(),
+            min_gap: 0.075,
             friction: 0.6,
             approach_angle: [24.0_f64.to_radians(), 43.0_f64.to_radians()],
             foot_speed: None,
@@ -109,6 +117,7 @@ impl KinodynamicSettings {
         let fields = [
             ("rate", self.rate, 30.0, 240.0),
             ("time_scale", self.time_scale, 0.5, 4.0),
+            ("min_gap", self.min_gap, 0.0, 0.3),
             ("friction", self.friction, 0.1, 2.0),
             ("approach_angle[0]", least, 0.0, 1.5),
             ("approach_angle[1]", greatest, least, 1.57),
@@ -128,6 +137,7 @@ impl KinodynamicSettings {
             ("weights.q_i[2]", w.q_i[2], 0.0, 1e3),
             ("weights.q_target", w.q_target, 0.0, 1e6),
             ("weights.q_a", w.q_a, 0.0, 1.0),
+            ("weights.q_j", w.q_j, 0.0, 1.0),
             ("weights.q_tau", w.q_tau, 0.0, 1e3),
         ];
         for (field, value, least, most) in fields {

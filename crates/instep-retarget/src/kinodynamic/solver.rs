@@ -3,7 +3,7 @@
 //! Source: Nocedal and Wright, Numerical Optimization (2006), algorithm 17.4 and section 10.3. Every row is a square
 //! ([`super::terms`]), so the matrix of a step is positive definite whatever rows are redundant. The forces of a node
 //! meet nothing but that node's three coefficients: they are eliminated there (Schur complement), and what is left is
-//! banded with 3 nv - 1 diagonals ([`crate::banded`]). A step of a three-second clip at 120 nodes a second takes about
+//! banded with 3 nv diagonals below the main one ([`crate::banded`]). A step of a three-second clip at 120 nodes a second takes about
 //! a tenth of a second, where one quadratic program of that size took eight seconds in a general sparse solver
 //! (clarabel), and a general interior-point method (POUNCE, Ipopt) 6 to 17 seconds in all at a quarter of the nodes.
 //!
@@ -19,19 +19,23 @@ use super::node::{Scratch, rows};
 use super::plan::Plan;
 use super::terms::{FAMILIES, Family, Pass, Sink, Worst};
 use super::transcription::Unknowns;
-use super::{Progress, ankle_lock, limits};
+use super::{Progress, ankle_lock, limits, smoothness};
 use crate::banded::Banded;
 
 /// First penalty of each family, in the order of [`Family::ALL`].
-const RHO: [f64; FAMILIES] = [1e-1, 1e-1, 1e2, 1e2, 1e2, 1e2, 1e-1, 1e1, 1e0, 1e0, 1e1];
+const RHO: [f64; FAMILIES] = [1e0, 1e0, 1e3, 1e2, 1e2, 1e2, 1e-1, 1e1, 1e0, 1e1, 1e1];
 /// Most that a penalty grows to, as a factor.
-const RHO_GROWTH: f64 = 1e6;
+const RHO_GROWTH: f64 = 1e4;
 /// Rounds in which standing feet still find their place.
 const SETTLING: usize = 2;
 /// Most steps in one round.
 const STEPS: usize = 12;
 /// Largest force of the damping on the forces, which keeps their matrix well conditioned.
 const FORCE_RIDGE: f64 = 1e-8;
+/// Damping of forces, which are about one, over that of coordinates.
+const FORCE_DAMPING: f64 = 0.1;
+/// Damping values tried for a step before the merit counts as lowest.
+const TRIES: usize = 10;
 
 /// How the iterations ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,7 +46,7 @@ pub(crate) enum End {
     Stopped,
 }
 
-/// Rows on coefficients alone, at most two of them.
+/// Rows on coefficients alone, a few of them.
 pub(crate) struct CoefficientSink<'a> {
     system: Option<(&'a mut Banded, &'a mut Vec<f64>)>,
     worst: Option<&'a mut Worst>,
@@ -80,12 +84,17 @@ impl CoefficientSink<'_> {
         if one_sided && residual <= 0.0 {
             return;
         }
-        self.merit += 0.5 * rho * residual * residual;
+        self.cost(rho, residual, gradient);
+    }
+
+    /// A cost `weight` `value`^2 / 2, or a row of the augmented Lagrangian.
+    pub(crate) fn cost(&mut self, weight: f64, value: f64, gradient: &[(usize, f64)]) {
+        self.merit += 0.5 * weight * value * value;
         if let Some((matrix, sums)) = self.system.as_mut() {
             for (at, &(i, g)) in gradient.iter().enumerate() {
-                sums[i] += rho * g * residual;
+                sums[i] += weight * g * value;
                 for &(j, other) in &gradient[..=at] {
-                    matrix.add(i.max(j), i.min(j), rho * g * other);
+                    matrix.add(i.max(j), i.min(j), weight * g * other);
                 }
             }
         }
@@ -95,7 +104,7 @@ impl CoefficientSink<'_> {
 /// The forces' part of one node's step.
 struct Eliminated {
     factor: Cholesky<f64, Dyn>,
-    /// L^-1 H_fc.
+    /// (L^-1 H_fc)^T.
     coupling: DMatrix<f64>,
     /// L^-1 g_f.
     right: DVector<f64>,
@@ -109,8 +118,8 @@ pub(crate) struct Solver<'a, 'b> {
     coefficient_multipliers: Vec<f64>,
     stencil: Stencil,
     scratch: Scratch,
+    locals: Vec<Local>,
     matrix: Banded,
-    attempt: Banded,
     gradient: Vec<f64>,
     eliminated: Vec<Option<Eliminated>>,
     damping: f64,
@@ -125,15 +134,14 @@ impl<'a, 'b> Solver<'a, 'b> {
         let nv = plan.tree.nv;
         let count = plan.nodes.len();
         let size = x.c.len();
-        let matrix = Banded::zeros(size, 3 * nv - 1);
+        let matrix = Banded::zeros(size, 3 * nv);
         Self {
-            x,
             rho: RHO,
             node_multipliers: vec![Vec::new(); count],
             coefficient_multipliers: Vec::new(),
             stencil: Stencil::new(plan.step),
             scratch: Scratch::new(plan),
-            attempt: matrix.clone(),
+            locals: x.f.iter().map(|f| Local::new(nv, f.len(), Stencil::new(plan.step))).collect(),
             matrix,
             gradient: vec![0.0; size],
             eliminated: Vec::new(),
@@ -141,6 +149,7 @@ impl<'a, 'b> Solver<'a, 'b> {
             iterations: 0,
             cost: 0.0,
             last_worst: Worst::default(),
+            x,
             plan,
         }
     }
@@ -174,6 +183,7 @@ impl<'a, 'b> Solver<'a, 'b> {
         };
         limits::rows(self.plan, &x.c, &mut sink);
         ankle_lock::rows(self.plan, &x.c, &mut sink);
+        smoothness::rows(self.plan, &x.c, &mut sink);
         sink.merit
     }
 
@@ -195,49 +205,75 @@ impl<'a, 'b> Solver<'a, 'b> {
         worst
     }
 
-    /// Builds matrix and gradient at the present unknowns. False where a node's forces cannot be eliminated.
-    fn linearise(&mut self) -> bool {
+    /// Builds every node's matrix and gradient at the present unknowns.
+    fn linearise(&mut self) {
         let nv = self.plan.tree.nv;
-        self.matrix.clear();
-        self.gradient.fill(0.0);
-        self.eliminated.clear();
         let mut state = Default::default();
-        let mut locals: std::collections::BTreeMap<usize, Local> = std::collections::BTreeMap::new();
         for k in 0..self.plan.nodes.len() {
             self.x.state(k, nv, &self.stencil, &mut state);
-            let forces = self.x.f[k].len();
-            let local = locals.entry(forces).or_insert_with(|| Local::new(nv, forces, self.stencil));
+            let local = &mut self.locals[k];
             local.clear();
             let mut sink = Sink::new(Pass::Derivatives(local), k, &self.rho, &mut self.node_multipliers[k]);
             let [q, v, a] = &state;
             rows(self.plan, k, [q, v, a, &self.x.f[k]], true, &mut self.scratch, &mut sink);
             local.finish();
-            let mut block = local.matrix.view((0, 0), (3 * nv, 3 * nv)).into_owned();
-            let mut gradient = DVector::from_column_slice(&local.gradient[..3 * nv]);
-            if forces > 0 {
-                let mut own = local.matrix.view((3 * nv, 3 * nv), (forces, forces)).into_owned();
-                own.fill_upper_triangle_with_lower_triangle();
-                (0..forces).for_each(|i| own[(i, i)] += FORCE_RIDGE);
-                let Some(factor) = own.cholesky() else { return false };
-                let mut coupling = local.matrix.view((3 * nv, 0), (forces, 3 * nv)).into_owned();
-                let mut right = DVector::from_column_slice(&local.gradient[3 * nv..]);
-                let l = factor.l_dirty();
-                if !(l.solve_lower_triangular_mut(&mut coupling) && l.solve_lower_triangular_mut(&mut right)) {
-                    return false;
-                }
-                block.gemm_tr(-1.0, &coupling, &coupling, 1.0);
-                gradient.gemv_tr(-1.0, &coupling, &right, 1.0);
-                self.eliminated.push(Some(Eliminated { factor, coupling, right }));
-            } else {
-                self.eliminated.push(None);
-            }
-            for j in 0..3 * nv {
+        }
+    }
+
+    /// Eliminates the forces and sums up the banded system, both damped. False where that cannot be.
+    fn assemble(&mut self) -> bool {
+        let nv = self.plan.tree.nv;
+        self.matrix.clear();
+        self.gradient.fill(0.0);
+        self.eliminated.clear();
+        for (k, local) in self.locals.iter().enumerate() {
+            let forces = self.x.f[k].len();
+            let wide = 3 * nv;
+            let size = wide + forces;
+            let whole = local.matrix.as_slice();
+            for j in 0..wide {
                 let target = self.matrix.column_mut(k * nv + j);
-                for (entry, value) in target.iter_mut().zip(&block.column(j).as_slice()[j..]) {
+                for (entry, value) in target.iter_mut().zip(&whole[j * size + j..j * size + wide]) {
                     *entry += value;
                 }
-                self.gradient[k * nv + j] += gradient[j];
+                self.gradient[k * nv + j] += local.gradient[j];
             }
+            if forces == 0 {
+                self.eliminated.push(None);
+                continue;
+            }
+            let mut own = local.matrix.view((wide, wide), (forces, forces)).into_owned();
+            own.fill_upper_triangle_with_lower_triangle();
+            (0..forces).for_each(|i| own[(i, i)] += FORCE_RIDGE + FORCE_DAMPING * self.damping);
+            let Some(factor) = own.cholesky() else { return false };
+            // L^-1 H_fc, row by row, by forward substitution of whole rows.
+            let mut coupling = DMatrix::from_fn(wide, forces, |j, i| local.matrix[(wide + i, j)]);
+            let mut right = DVector::from_column_slice(&local.gradient[wide..]);
+            let l = factor.l_dirty();
+            for i in 0..forces {
+                for before in 0..i {
+                    let share = l[(i, before)];
+                    let (done, rest) = coupling.as_mut_slice().split_at_mut(i * wide);
+                    let done = &done[before * wide..(before + 1) * wide];
+                    rest[..wide].iter_mut().zip(done).for_each(|(entry, value)| *entry -= share * value);
+                    right[i] -= share * right[before];
+                }
+                let pivot = 1.0 / l[(i, i)];
+                coupling.column_mut(i).scale_mut(pivot);
+                right[i] *= pivot;
+            }
+            let rows = coupling.as_slice();
+            for j in 0..wide {
+                let target = &mut self.matrix.column_mut(k * nv + j)[..wide - j];
+                let mut fall = 0.0;
+                for (row, r) in rows.chunks_exact(wide).zip(right.iter()) {
+                    let share = row[j];
+                    fall += share * r;
+                    target.iter_mut().zip(&row[j..]).for_each(|(entry, value)| *entry -= share * value);
+                }
+                self.gradient[k * nv + j] -= fall;
+            }
+            self.eliminated.push(Some(Eliminated { factor, coupling, right }));
         }
         let mut sink = CoefficientSink {
             system: Some((&mut self.matrix, &mut self.gradient)),
@@ -250,52 +286,60 @@ impl<'a, 'b> Solver<'a, 'b> {
         };
         limits::rows(self.plan, &self.x.c, &mut sink);
         ankle_lock::rows(self.plan, &self.x.c, &mut sink);
-        true
+        smoothness::rows(self.plan, &self.x.c, &mut sink);
+        (0..self.gradient.len()).for_each(|i| self.matrix.add(i, i, self.damping));
+        self.gradient.iter().all(|g| g.is_finite())
     }
 
-    /// One damped step; returns the merit before and after, `None` where no damping lowers it.
-    fn step(&mut self, before: f64) -> Option<f64> {
-        if !self.linearise() || self.gradient.iter().any(|g| !g.is_finite()) {
+    /// The present unknowns moved by the damped step, and by how much the merit should fall; none where the system
+    /// cannot be solved.
+    fn trial(&mut self) -> Option<(Unknowns, f64)> {
+        if !self.assemble() {
             return None;
         }
         let nv = self.plan.tree.nv;
-        for _ in 0..8 {
-            self.attempt.copy_from(&self.matrix);
-            for i in 0..self.gradient.len() {
-                self.attempt.add(i, i, self.damping);
-            }
-            let mut d: Vec<f64> = self.gradient.iter().map(|g| -g).collect();
-            if !self.attempt.factor_and_solve(&mut d) {
-                self.damping = (self.damping * 10.0).max(1e-9);
-                continue;
-            }
-            let mut trial = self.x.clone();
-            trial.c.iter_mut().zip(&d).for_each(|(c, d)| *c += d);
-            let mut predicted: f64 =
-                0.5 * d.iter().zip(&self.gradient).map(|(d, g)| d * (self.damping * d - g)).sum::<f64>();
-            for (k, part) in self.eliminated.iter().enumerate() {
-                let Some(part) = part else { continue };
-                let moved = DVector::from_column_slice(&d[k * nv..(k + 3) * nv]);
-                let mut step = -(&part.coupling * moved + &part.right);
-                predicted += 0.5 * part.right.norm_squared();
-                if part.factor.l_dirty().tr_solve_lower_triangular_mut(&mut step) {
-                    trial.f[k].iter_mut().zip(step.iter()).for_each(|(f, d)| *f += d);
-                }
-            }
-            let after = self.merit(&trial);
-            let ratio = (before - after) / predicted.max(f64::MIN_POSITIVE);
-            if after < before {
-                self.x = trial;
-                // Nielsen's rule: the better the prediction, the less damping.
-                let factor = (1.0 - (2.0 * ratio - 1.0).powi(3)).clamp(0.1, 4.0);
-                self.damping = (self.damping * factor).clamp(1e-9, 1e6);
-                return Some(after);
-            }
-            self.damping = (self.damping * 6.0).max(1e-9);
-            if predicted.abs() < 1e-12 * before.abs() {
+        let mut d: Vec<f64> = self.gradient.iter().map(|g| -g).collect();
+        if !self.matrix.factor_and_solve(&mut d) {
+            return None;
+        }
+        let mut trial = self.x.clone();
+        trial.c.iter_mut().zip(&d).for_each(|(c, d)| *c += d);
+        // Of the damped model, which is what the step minimises: half of minus gradient times step.
+        let mut predicted: f64 = -0.5 * d.iter().zip(&self.gradient).map(|(d, g)| d * g).sum::<f64>();
+        for (k, part) in self.eliminated.iter().enumerate() {
+            let Some(part) = part else { continue };
+            let moved = DVector::from_column_slice(&d[k * nv..(k + 3) * nv]);
+            let mut step = -(part.coupling.tr_mul(&moved) + &part.right);
+            predicted += 0.5 * part.right.norm_squared();
+            if !part.factor.l_dirty().tr_solve_lower_triangular_mut(&mut step) {
                 return None;
             }
+            trial.f[k].iter_mut().zip(step.iter()).for_each(|(f, d)| *f += d);
         }
+        Some((trial, predicted))
+    }
+
+    /// One damped step; returns the merit after it, `None` where no damping lowers it.
+    fn step(&mut self, before: f64) -> Option<f64> {
+        self.linearise();
+        for _ in 0..TRIES {
+            if let Some((trial, predicted)) = self.trial() {
+                let after = self.merit(&trial);
+                if after < before {
+                    self.x = trial;
+                    // Nielsen's rule: the better the prediction, the less damping.
+                    let ratio = (before - after) / predicted.max(f64::MIN_POSITIVE);
+                    let factor = (1.0 - (2.0 * ratio - 1.0).powi(3)).clamp(0.1, 4.0);
+                    self.damping = (self.damping * factor).clamp(1e-9, 1e9);
+                    return Some(after);
+                }
+                if predicted < 1e-12 * before.abs() {
+                    return None;
+                }
+            }
+            self.damping = (self.damping * 6.0).max(1e-9);
+        }
+        self.damping = self.damping.min(1e3);
         None
     }
 
@@ -340,7 +384,7 @@ impl<'a, 'b> Solver<'a, 'b> {
                 }
             }
             let worst = self.violations(true);
-            let (_, by) = worst.most();
+            let by = self.real(&worst);
             if best.as_ref().is_none_or(|(least, _)| by < *least) {
                 best = Some((by, self.x.clone()));
             }
@@ -352,19 +396,25 @@ impl<'a, 'b> Solver<'a, 'b> {
                 let now = worst.values[i];
                 if now > settings.tolerance && now > 0.25 * *before {
                     let most = RHO[i] * RHO_GROWTH;
-                    self.rho[i] = (self.rho[i] * 5.0).min(most);
+                    self.rho[i] = (self.rho[i] * 4.0).min(most);
                 }
                 *before = now;
             }
         }
         // What was best after a round, unless the present is better still.
-        let (_, now) = self.violations(false).most();
+        let worst = self.violations(false);
+        let now = self.real(&worst);
         if let Some((least, unknowns)) = best {
             if !(now <= least) {
                 self.x = unknowns;
             }
         }
         end
+    }
+
+    /// The worst violation of the real limits, margins not counted.
+    fn real(&self, worst: &Worst) -> f64 {
+        super::assemble::violations(self, worst).values().fold(0.0, |most, v| v.max(most))
     }
 
     /// Coordinates at all nodes.

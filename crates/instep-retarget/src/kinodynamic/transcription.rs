@@ -43,8 +43,11 @@ impl Unknowns {
     /// Position, speed and acceleration at a node.
     pub(crate) fn state(&self, k: usize, nv: usize, stencil: &Stencil, out: &mut [Vec<f64>; 3]) {
         for (values, weights) in out.iter_mut().zip([stencil.q, stencil.v, stencil.a]) {
+            let (first, rest) = self.c[k * nv..(k + 3) * nv].split_at(nv);
+            let (second, third) = rest.split_at(nv);
             values.clear();
-            values.extend((0..nv).map(|i| (0..3).map(|b| weights[b] * self.c[(k + b) * nv + i]).sum::<f64>()));
+            let three = first.iter().zip(second).zip(third);
+            values.extend(three.map(|((a, b), c)| weights[0] * a + weights[1] * b + weights[2] * c));
         }
     }
 }
