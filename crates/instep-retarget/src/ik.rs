@@ -51,8 +51,11 @@ struct TurnTask {
     link: usize,
     weight: f64,
     dofs: Vec<usize>,
-    target: fn(&Target) -> UnitQuaternion<f64>,
+    target: Turn,
 }
+
+/// Reads a rotation out of a frame's target.
+type Turn = fn(&Target) -> UnitQuaternion<f64>;
 
 /// Least-squares terms of one frame or of all.
 pub(crate) struct ClipIk<'a> {
@@ -168,14 +171,14 @@ impl<'a> ClipIk<'a> {
             .iter()
             .find(|k| k.landmark == instep_motion::landmark::Landmark::Chest)
             .map_or(robot.base, |k| k.at.link);
-        let mut turns: Vec<(usize, f64, fn(&Target) -> UnitQuaternion<f64>)> = vec![
+        let mut turns: Vec<(usize, f64, Turn)> = vec![
             (robot.base, weights.pelvis_turn, |t| t.pelvis),
             (chest, weights.chest_turn, |t| t.chest),
             (robot.legs[0].foot, weights.sole_turn, |t| t.soles[0]),
             (robot.legs[1].foot, weights.sole_turn, |t| t.soles[1]),
         ];
-        turns.extend(robot.legs[0].toe_link.map(|link| (link, weights.toe_turn, (|t| t.toes[0]) as fn(&Target) -> _)));
-        turns.extend(robot.legs[1].toe_link.map(|link| (link, weights.toe_turn, (|t| t.toes[1]) as fn(&Target) -> _)));
+        turns.extend(robot.legs[0].toe_link.map(|link| (link, weights.toe_turn, (|t| t.toes[0]) as Turn)));
+        turns.extend(robot.legs[1].toe_link.map(|link| (link, weights.toe_turn, (|t| t.toes[1]) as Turn)));
         let turns = turns
             .into_iter()
             .map(|(link, weight, target)| TurnTask { link, weight, dofs: dofs_of(link, None), target })

@@ -15,6 +15,9 @@ fn a_block_meets_the_ball_with_the_stated_restitution_in_every_phase() {
             let impact = block_impact(&settings, 1.0, speed, f64::from(phase) / 100.0);
             assert!((impact.restitution - 0.70).abs() <= 0.02, "{speed} m/s, phase {phase}: {impact:?}");
             assert!(impact.energy_ratio <= 1.0 + 1e-9, "{speed} m/s, phase {phase}: {impact:?}");
+            // Momentum is kept: v_ball / v_block = (1 + e) M / (M + m).
+            let closed_form = (1.0 + impact.restitution) / 1.43;
+            assert!((impact.speed_ratio - closed_form).abs() < 1e-9, "{speed} m/s, phase {phase}: {impact:?}");
         }
     }
 }

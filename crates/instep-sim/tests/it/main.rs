@@ -1,4 +1,11 @@
 //! Integration tests of the world, one binary.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "a test stops at the first surprise"
+)]
 
 #[path = "../rig/mod.rs"]
 mod rig;
