@@ -13,6 +13,8 @@ mod rig;
 mod ball;
 mod determinism;
 mod limits;
+mod sensors;
+mod trial;
 
 use std::path::PathBuf;
 use std::sync::Arc;
