@@ -3,65 +3,69 @@
 use std::collections::BTreeMap;
 
 use instep_motion::reference::{Knot, Reference, ReferenceKind, Source};
-use instep_robot::LinkPoint;
-use nalgebra::Vector3;
+use nalgebra::{Matrix6, Vector3, Vector6};
 
 use super::approach;
 use super::inverse_dynamics::Dynamics;
+use super::plan::Plan;
 use super::solver::Solver;
 use super::terms::{Family, Worst};
 use crate::kinematic::Retargeted;
 
-/// Numbers are kept to this many digits behind the point: enough for accelerations, and half the file's size.
-const DIGITS: f64 = 1e9;
+/// What positions, speeds and momenta are rounded to: enough for accelerations, and half the file's size.
+const DIGITS: f64 = 1e8;
+/// Keeps the changes of [`balance`] small where the standing points cannot give a wrench.
+const BALANCE_RIDGE: f64 = 1e-6;
+/// What forces (N) and torques (N m) are rounded to.
+const FORCE_DIGITS: f64 = 1e4;
 
-fn rounded(value: f64) -> f64 {
-    (value * DIGITS).round() / DIGITS
+fn rounded<const N: usize>(values: [f64; N], digits: f64) -> [f64; N] {
+    values.map(|value| (value * digits).round() / digits)
 }
 
-/// The reference, every node a knot.
+/// The reference: a knot at every node and one half-way to the next.
+///
+/// At the half-way knots the motion is the spline's. The forces are the mean of the nodes', which leaves a wrench on
+/// the base of one or two percent of the weight in the fastest part of a kick, as true forces are curved in time; the
+/// least change of the standing points' forces that takes the wrench away is added, as far as the friction cone lets
+/// it. In flight there is nothing to add.
 pub(crate) fn reference(solver: &Solver, start: &Retargeted) -> Reference {
     let plan = &*solver.plan;
     let robot = plan.robot;
     let mut data = robot.data();
-    let nv = robot.nv();
-    let mut torques = vec![0.0; nv];
     let mut dynamics = Dynamics::new(&plan.tree);
-    let knots = (0..plan.nodes.len())
-        .map(|k| {
-            let [x, xv, xa] = solver.state(k);
+    let count = plan.nodes.len();
+    let knots = (0..2 * count - 1)
+        .map(|i| {
+            let [x, xv, xa] = if i % 2 == 0 { solver.state(i / 2) } else { half_way(solver, i / 2) };
             let (q, v) = plan.tree.state(&x, &xv);
-            let mut forces = vec![[0.0; 3]; robot.contacts.len()];
-            for (&p, f) in plan.nodes[k].pushing.iter().zip(solver.x.f[k].chunks(3)) {
-                forces[p] = [f[0], f[1], f[2]].map(|f| rounded(f * plan.weight));
-            }
-            let acting: Vec<(LinkPoint, Vector3<f64>)> =
-                robot.contacts.iter().zip(&forces).map(|(c, f)| (c.at, Vector3::from(*f))).collect();
             data.set_state(&q, &v);
-            // Joint accelerations are the same in both conventions; torques of joints need the base's as well.
             dynamics.compute(&plan.tree, &x, &xv, &xa, false);
-            torques.copy_from_slice(&dynamics.force);
-            let mut jacobian = vec![0.0; 3 * nv];
-            for (at, force) in &acting {
-                let world = data.point(at);
-                data.point_jacobian_into(at.link, &world, &mut jacobian);
-                for i in 6..nv {
-                    torques[i] -= (0..3).map(|axis| jacobian[axis * nv + i] * force[axis]).sum::<f64>();
+            let around = [i / 2, i.div_ceil(2)];
+            let mut forces = vec![Vector3::zeros(); robot.contacts.len()];
+            for k in around {
+                for (&p, f) in plan.nodes[k].pushing.iter().zip(solver.x.f[k].chunks(3)) {
+                    forces[p] += Vector3::new(f[0], f[1], f[2]) * (0.5 * plan.weight);
                 }
             }
-            let cut = |values: &[f64]| values.iter().map(|v| rounded(*v)).collect::<Vec<f64>>();
+            if i % 2 == 1 {
+                balance(plan, &dynamics, &mut forces);
+            }
+            let forces: Vec<[f64; 3]> = forces.into_iter().map(|f| rounded(f.into(), FORCE_DIGITS)).collect();
+            let torques = generalised(plan, &dynamics, &forces.iter().map(|f| Vector3::from(*f)).collect::<Vec<_>>());
+            let cut = |values: &[f64], digits| values.iter().map(|v| rounded([*v], digits)[0]).collect::<Vec<f64>>();
             Knot {
-                base_position: [q[0], q[1], q[2]].map(rounded),
-                base_orientation: [q[3], q[4], q[5], q[6]],
-                base_velocity: [v[0], v[1], v[2]].map(rounded),
-                base_angular_velocity: [v[3], v[4], v[5]].map(rounded),
-                joints: cut(&q[7..]),
-                joint_velocities: cut(&v[6..]),
-                contacts: plan.nodes[k].standing.clone(),
+                base_position: rounded([q[0], q[1], q[2]], DIGITS),
+                base_orientation: rounded([q[3], q[4], q[5], q[6]], 1e2 * DIGITS),
+                base_velocity: rounded([v[0], v[1], v[2]], DIGITS),
+                base_angular_velocity: rounded([v[3], v[4], v[5]], DIGITS),
+                joints: cut(&q[7..], DIGITS),
+                joint_velocities: cut(&v[6..], DIGITS),
+                contacts: (0..robot.contacts.len()).map(|p| around.iter().all(|&k| plan.nodes[k].standing[p])).collect(),
                 forces,
-                torques: torques[6..].iter().map(|t| (t * 1e6).round() / 1e6).collect(),
-                com: <[f64; 3]>::from(data.com()).map(rounded),
-                momentum: data.momentum().map(rounded),
+                torques: cut(&torques[6..], FORCE_DIGITS),
+                com: rounded(data.com().into(), DIGITS),
+                momentum: rounded(data.momentum(), DIGITS),
             }
         })
         .collect();
@@ -70,12 +74,70 @@ pub(crate) fn reference(solver: &Solver, start: &Retargeted) -> Reference {
         robot: robot.name.clone(),
         kind: ReferenceKind::Kinodynamic,
         source: Source { clip_start: plan.clip_start, ..start.reference.source.clone() },
-        rate: plan.settings.rate,
+        rate: 2.0 * plan.settings.rate,
         ball: plan.ball.into(),
         phases: plan.phases,
         joint_names: robot.joints.iter().map(|joint| joint.name.clone()).collect(),
         contact_names: robot.contacts.iter().map(|contact| contact.name.clone()).collect(),
         knots,
+    }
+}
+
+/// Position, speed and acceleration of the spline half-way between a node and the next.
+fn half_way(solver: &Solver, k: usize) -> [Vec<f64>; 3] {
+    let ([q0, v0, a0], [q1, v1, a1]) = (solver.state(k), solver.state(k + 1));
+    let h = solver.plan.step;
+    let each = |value: &dyn Fn(usize) -> f64| (0..q0.len()).map(value).collect::<Vec<f64>>();
+    [
+        each(&|i| 0.5 * (q0[i] + q1[i]) + 0.125 * h * (v0[i] - v1[i])),
+        each(&|i| 1.5 * (q1[i] - q0[i]) / h - 0.25 * (v0[i] + v1[i])),
+        each(&|i| 0.5 * (a0[i] + a1[i])),
+    ]
+}
+
+/// Generalised forces (33) with contact forces (N) at all contact points taken off.
+fn generalised(plan: &Plan, dynamics: &Dynamics, forces: &[Vector3<f64>]) -> Vec<f64> {
+    let mut sums = dynamics.force.clone();
+    for (contact, force) in plan.robot.contacts.iter().zip(forces).filter(|(_, force)| force.norm() > 0.0) {
+        let at = dynamics.pose.point(&contact.at);
+        for &i in plan.tree.chain(contact.at.link) {
+            sums[i] -= plan.tree.column(&dynamics.pose, i, &at).dot(force);
+        }
+    }
+    sums
+}
+
+/// Adds the least change of the forces that push which takes the wrench off the base, or as much of it as can be.
+fn balance(plan: &Plan, dynamics: &Dynamics, forces: &mut [Vector3<f64>]) {
+    let wrench = generalised(plan, dynamics, forces);
+    let pushing: Vec<usize> = (0..forces.len()).filter(|&p| forces[p].norm() > 0.0).collect();
+    if pushing.is_empty() {
+        return;
+    }
+    // Points change their force in proportion to what they carry.
+    let columns: Vec<(f64, [Vector3<f64>; 6])> = pushing
+        .iter()
+        .map(|&p| {
+            let at = dynamics.pose.point(&plan.robot.contacts[p].at);
+            let carried = (forces[p].z / plan.weight).max(0.0);
+            (carried, std::array::from_fn(|i| plan.tree.column(&dynamics.pose, i, &at)))
+        })
+        .collect();
+    let mut square = Matrix6::from_fn(|i, j| columns.iter().map(|(w, c)| w * c[i].dot(&c[j])).sum::<f64>());
+    (0..6).for_each(|i| square[(i, i)] += BALANCE_RIDGE);
+    let Some(factor) = square.cholesky() else { return };
+    let share = factor.solve(&Vector6::from_fn(|i, _| wrench[i]));
+    let change: Vec<Vector3<f64>> = columns
+        .iter()
+        .map(|(w, column)| column.iter().zip(share.iter()).map(|(c, s)| c * *s).sum::<Vector3<f64>>() * *w)
+        .collect();
+    // As much of it as leaves every force inside the cone.
+    let inside = |f: &Vector3<f64>| f.x.hypot(f.y) <= plan.settings.friction * f.z;
+    for part in [1.0, 0.5, 0.25] {
+        if pushing.iter().zip(&change).all(|(&p, change)| inside(&(forces[p] + change * part))) {
+            pushing.iter().zip(&change).for_each(|(&p, change)| forces[p] += change * part);
+            return;
+        }
     }
 }
 
@@ -108,6 +170,7 @@ pub(crate) fn violations(solver: &Solver, worst: &Worst) -> BTreeMap<&'static st
                 Family::JointSpeed => value - settings.speed_margin,
                 Family::JointLimit => value - settings.joint_margin,
                 Family::SelfCollision => value - settings.clearance,
+                Family::Ground => value - settings.ground_clearance,
                 Family::Friction => value - super::friction::SPARE,
                 Family::ApproachAngle => value - approach::SPARE,
                 _ => value,

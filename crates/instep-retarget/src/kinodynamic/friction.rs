@@ -7,11 +7,13 @@
 use super::node::View;
 use super::terms::{Family, Sink};
 
+/// Share of the cone's slope that is left for the knots half-way between the nodes ([`super::assemble`]).
+const RESERVE: f64 = 0.1;
 /// What is kept free of the cone, as a share of m g.
 pub(crate) const SPARE: f64 = 3e-4;
 
 pub(crate) fn rows(view: &View, sink: &mut Sink) {
-    let slope = view.plan.settings.friction * std::f64::consts::FRAC_1_SQRT_2;
+    let slope = (1.0 - RESERVE) * view.plan.settings.friction * std::f64::consts::FRAC_1_SQRT_2;
     for (i, f) in view.f.chunks(3).enumerate() {
         sink.at_most(Family::Friction, 3.0 * SPARE - f[2], |row| row.f[3 * i + 2] = -1.0);
         for axis in 0..2 {

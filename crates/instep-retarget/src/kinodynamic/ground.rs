@@ -16,7 +16,7 @@ pub(crate) fn rows(view: &View, sink: &mut Sink) {
         let count = view.plan.nodes.len();
         let beside = [view.k.saturating_sub(1), (view.k + 1).min(count - 1)];
         let near = beside.iter().any(|&n| view.plan.nodes[n].standing[point]);
-        let clearance = if near { 0.0 } else { 0.5 * view.plan.settings.clearance };
+        let clearance = if near { 0.0 } else { view.plan.settings.ground_clearance };
         let at = view.s.dynamics.pose.point(&contact.at);
         sink.at_most(Family::Ground, contact.radius + clearance - at.z, |row| {
             view.point_row(contact.at.link, &at, &-Vector3::z(), &mut row.q);

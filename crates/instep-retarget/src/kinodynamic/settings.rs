@@ -41,10 +41,10 @@ impl Default for KinodynamicWeights {
             q_v: 1e-5,
             q_h: 1e-4,
             q_f: 1e-3,
-            q_i: [0.02, 0.0, 0.0],
+            q_i: [0.05, 0.0, 0.0],
             q_target: 1.0,
             q_a: 2e-8,
-            q_j: 3e-9,
+            q_j: 4e-9,
             q_tau: 0.0,
         }
     }
@@ -54,8 +54,8 @@ impl Default for KinodynamicWeights {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct KinodynamicSettings {
-    /// Nodes of the spline and knots of the reference a second, before the time scale; 30 to 240. The paper has 30,
-    /// which cannot show what happens inside a swing of 0.1 s: see the module's documentation.
+    /// Nodes of the spline a second; 30 to 240. The reference has twice as many knots. The paper has 30, which cannot
+    /// show what happens inside a swing of 0.1 s: see the module's documentation.
     pub rate: f64,
     /// Factor on all times of the clip: 1.2 is a kick slowed down by a fifth. 0.5 to 4.
     pub time_scale: f64,
@@ -77,8 +77,11 @@ pub struct KinodynamicSettings {
     pub speed_margin: f64,
     /// Part of each joint's range that is kept free at both ends, rad.
     pub joint_margin: f64,
-    /// Gap that capsules keep (14), and contact points in the air keep to the ground (13), m.
+    /// Gap that capsules keep at the nodes (14), m; 0 to 0.05. Between the nodes a fast limb comes a little closer.
     pub clearance: f64,
+    /// Gap that contact points in the air keep to the ground at the nodes (13), m; 0 to 0.05. Between the nodes a
+    /// swinging foot comes a little closer.
+    pub ground_clearance: f64,
     /// Most Newton steps over all.
     pub iterations: usize,
     /// Most rounds of multipliers.
@@ -98,10 +101,11 @@ impl Default for KinodynamicSettings {
             friction: 0.6,
             approach_angle: [24.0_f64.to_radians(), 43.0_f64.to_radians()],
             foot_speed: None,
-            torque_margin: 0.05,
+            torque_margin: 0.08,
             speed_margin: 0.01,
             joint_margin: 0.005,
-            clearance: 0.002,
+            clearance: 0.005,
+            ground_clearance: 0.003,
             iterations: 300,
             rounds: 40,
             tolerance: 1e-4,
@@ -126,6 +130,7 @@ impl KinodynamicSettings {
             ("speed_margin", self.speed_margin, 0.0, 0.5),
             ("joint_margin", self.joint_margin, 0.0, 0.2),
             ("clearance", self.clearance, 0.0, 0.05),
+            ("ground_clearance", self.ground_clearance, 0.0, 0.05),
             ("tolerance", self.tolerance, 1e-8, 1e-1),
             ("weights.q_m", w.q_m, 0.0, 1e6),
             ("weights.q_posture", w.q_posture, 0.0, 1e6),
