@@ -48,7 +48,7 @@ pub struct Weights {
 
 impl Default for Weights {
     fn default() -> Self {
-        Self { position: 100.0, orientation: 30.0, roll: 8.0, height: 4.0, tilt: 3.0, yaw: 0.8, balance: 60.0, damping: 0.03 }
+        Self { position: 100.0, orientation: 30.0, roll: 3.0, height: 4.0, tilt: 2.0, yaw: 0.8, balance: 60.0, damping: 0.03 }
     }
 }
 
@@ -169,7 +169,7 @@ impl Ik {
     }
 
     /// Takes at most `steps` steps from `angles` toward `goals` with `swing` as the swing foot; stops when a step is
-    /// under ten microradians. `angles` and `pose` agree afterwards.
+    /// under a tenth of a milliradian (the next would be its square). `angles` and `pose` agree afterwards.
     pub fn solve(
         &mut self,
         tree: &Tree,
@@ -202,7 +202,7 @@ impl Ik {
             }
             damping = (damping * 0.2).max(self.weights.damping);
             (residual, cost) = (next, next_cost);
-            if largest < 1e-5 {
+            if largest < 1e-4 {
                 break;
             }
         }

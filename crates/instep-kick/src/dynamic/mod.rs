@@ -186,10 +186,9 @@ impl DynamicKick {
         if phase == Phase::WindUp {
             follow.propose(&stroke);
             if let Some((candidate, ball, good)) = follow.candidate {
-                let places = [candidate.contact, candidate.windup_point(), candidate.follow_point()];
+                let places = [candidate.pose(0.0), candidate.windup_pose(), candidate.follow_pose()];
                 if good < places.len() {
-                    let place = places[good];
-                    let foot = [place.x, place.y, place.z, candidate.yaw, 0.0];
+                    let foot = places[good];
                     let trunk = motion::trunk_support(&self.body, &self.settings, swing, candidate.yaw);
                     let goals = motion::goals(&foot, &trunk);
                     if good == 0 {

@@ -3,7 +3,7 @@
 
 use instep_motion::phase::Side;
 use instep_motion::spline::State;
-use nalgebra::Vector3;
+use nalgebra::{Rotation3, Vector3};
 
 use crate::dynamic::body::Body;
 use crate::dynamic::foot::windup_point;
@@ -29,15 +29,36 @@ pub(crate) struct Stroke {
     pub(crate) follow: f64,
     /// Foot speed at contact, m/s.
     pub(crate) speed: f64,
+    /// The striking face's axis in the sole's frame, m: the foot pitches about it.
+    pub(crate) axis: Vector3<f64>,
+    /// Pitch of the foot over its way, rad/m.
+    pub(crate) pitch: f64,
 }
 
 impl Stroke {
-    pub(crate) fn windup_point(&self) -> Vector3<f64> {
-        windup_point(&self.contact, self.direction, self.windup)
+    /// Sole's x, y, z, yaw and pitch where the striking face is `way` (m) past the contact: equation (2) for the face.
+    pub(crate) fn pose(&self, way: f64) -> [f64; 5] {
+        let pitch = -self.pitch * way;
+        let yaw = Rotation3::from_axis_angle(&Vector3::z_axis(), self.yaw);
+        let pitched = yaw * Rotation3::from_axis_angle(&Vector3::y_axis(), pitch) * self.axis;
+        let face = windup_point(&(self.contact + yaw * self.axis), self.direction, -way);
+        let sole = face - pitched;
+        [sole.x, sole.y, sole.z, self.yaw, pitch]
     }
 
-    pub(crate) fn follow_point(&self) -> Vector3<f64> {
-        windup_point(&self.contact, self.direction, -self.follow)
+    pub(crate) fn windup_pose(&self) -> [f64; 5] {
+        self.pose(-self.windup)
+    }
+
+    pub(crate) fn follow_pose(&self) -> [f64; 5] {
+        self.pose(self.follow)
+    }
+
+    /// Change of the pose with the way at the contact.
+    fn slope(&self) -> [f64; 5] {
+        const STEP: f64 = 1e-5;
+        let (after, before) = (self.pose(STEP), self.pose(-STEP));
+        std::array::from_fn(|i| (after[i] - before[i]) / (2.0 * STEP))
     }
 
     /// From the wind-up point to the contact, s: with a quintic from rest to the speed v without acceleration at either
@@ -136,22 +157,21 @@ impl Motion {
     /// Wind-up and kick from where the paths end.
     fn stroke(&mut self, body: &Body, settings: &DynamicSettings, stroke: &Stroke) {
         let times = &settings.times;
-        let pose = |p: Vector3<f64>| [p.x, p.y, p.z, stroke.yaw, 0.0];
-        let (windup, follow) = (stroke.windup_point(), stroke.follow_point());
+        let (windup, follow) = (stroke.windup_pose(), stroke.follow_pose());
         let now = self.foot.last().position;
-        let way = (windup - Vector3::new(now[0], now[1], now[2])).norm();
+        let way = (Vector3::new(windup[0], windup[1], windup[2]) - Vector3::new(now[0], now[1], now[2])).norm();
         let duration = (way / times.foot_speed).max(times.foot_least);
         let turned = trunk_support(body, settings, self.swing, stroke.yaw);
-        self.foot.to(duration, State::at_rest(pose(windup)));
+        self.foot.to(duration, State::at_rest(windup));
         self.trunk.to(duration, State::at_rest(turned));
         self.foot.hold(times.aim);
         self.trunk.hold(times.aim);
         self.ends[2] = self.foot.end();
-        let velocity = [stroke.speed * stroke.direction.cos(), stroke.speed * stroke.direction.sin(), 0.0, 0.0, 0.0];
-        let contact = State { position: pose(stroke.contact), velocity, acceleration: [0.0; 5] };
+        let velocity = stroke.slope().map(|slope| slope * stroke.speed);
+        let contact = State { position: stroke.pose(0.0), velocity, acceleration: [0.0; 5] };
         self.foot.to(stroke.time(), contact);
         self.contact = Some(self.foot.end());
-        self.foot.to(2.0 * stroke.follow / stroke.speed, State::at_rest(pose(follow)));
+        self.foot.to(2.0 * stroke.follow / stroke.speed, State::at_rest(follow));
         self.trunk.hold(self.foot.end() - self.trunk.end());
         self.ends[3] = self.foot.end();
     }

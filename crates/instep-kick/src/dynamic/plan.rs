@@ -24,11 +24,15 @@ use crate::tree::TreePose;
 /// Steps of inverse kinematics to a place that is far from the last.
 const FAR: usize = 12;
 /// The same to a place a hand's breadth away.
-const MIDDLE: usize = 8;
+const MIDDLE: usize = 6;
 /// The same to a place near the last.
 const NEAR: usize = 3;
+/// The same along a way that is sampled densely.
+const WAY: usize = 2;
+/// Time constant with which the planned centre of pressure is smoothed before it is held against the foot, s.
+const TIPPING: f64 = 0.04;
 /// Sampling of the forecast, s: in the kick, and elsewhere.
-const FINE: f64 = 0.012;
+const FINE: f64 = 0.016;
 const COARSE: f64 = 0.04;
 
 /// Least and greatest angle from the foot's x axis at which a corner strikes, rad.
@@ -104,20 +108,14 @@ impl Planner {
         request: &KickRequest,
     ) -> Result<Planned, Refusal> {
         request.check()?;
-        // When the contact comes decides where a moving ball is, and the other way round: a few rounds settle it.
+        // When the contact comes decides where a moving ball is, and the other way round: two rounds settle it.
         let moving = Vector2::from(request.ball_velocity).norm() > 0.02;
         let mut contact = settings.times.shift + settings.times.settle + 3.0 * settings.times.foot_least;
-        let mut result = self.plan_at(body, settings, request, if moving { contact } else { 0.0 });
         if moving {
-            for _ in 0..3 {
-                match &result {
-                    Ok(planned) if (planned.plan.contact - contact).abs() > 0.005 => contact = planned.plan.contact,
-                    _ => break,
-                }
-                result = self.plan_at(body, settings, request, contact);
-            }
+            // One round without following the whole way tells the time well enough.
+            contact = self.plan_at(body, settings, request, contact, false)?.plan.contact;
         }
-        let planned = result?;
+        let planned = self.plan_at(body, settings, request, if moving { contact } else { 0.0 }, true)?;
         if let Some(deadline) = request.deadline
             && planned.plan.contact > deadline
         {
@@ -131,13 +129,14 @@ impl Planner {
         Ok(planned)
     }
 
-    /// Plans for a ball that is where it will be after `time` (s).
+    /// Plans for a ball that is where it will be after `time` (s); `whole`: the best candidates' whole way is forecast.
     fn plan_at(
         &mut self,
         body: &Body,
         settings: &DynamicSettings,
         request: &KickRequest,
         time: f64,
+        whole: bool,
     ) -> Result<Planned, Refusal> {
         let (ball, velocity) = roll(request.ball, request.ball_velocity, settings.ball.deceleration, time);
         check_place(body, settings, ball)?;
@@ -171,10 +170,11 @@ impl Planner {
             let cost = |c: &Option<Candidate>| c.map_or(f64::INFINITY, |c| c.cost);
             cost(a).total_cmp(&cost(b))
         });
-        // The best forecasts are enough: what the third best cannot do, the sixth will not.
-        for candidate in candidates.iter().flatten().take(3) {
+        // The two best are enough: what neither can do, the sixth will not.
+        for candidate in candidates.iter().flatten().take(2) {
             let motion = Motion::kick(body, settings, &candidate.stroke);
-            match self.forecast(body, settings, &motion, &candidate.stroke) {
+            let forecast = if whole { self.forecast(body, settings, &motion, &candidate.stroke) } else { Ok(()) };
+            match forecast {
                 Ok(()) => {
                     let front = candidate.stroke.face == Face::Front;
                     let plan = KickPlan {
@@ -242,11 +242,13 @@ impl Planner {
             windup: s.windup,
             follow: s.follow,
             speed: 1.0,
+            axis: point.axis,
+            pitch: s.pitch,
         };
 
         // Contact first: where it is out of reach, nothing else matters.
         self.angles.copy_from_slice(&self.lifted[swing as usize]);
-        if let Err(cause) = self.reach(body, settings, &stroke, contact, Place::Contact, FAR) {
+        if let Err(cause) = self.reach(body, settings, &stroke, stroke.pose(0.0), Place::Contact, FAR) {
             return Some(Err(cause));
         }
         self.saved.copy_from_slice(&self.angles);
@@ -262,7 +264,7 @@ impl Planner {
         let along = ball_velocity.dot(&toward.xy());
         stroke.speed = (change / gain(settings, mass) * settings.ball.speed_gain + along).max(0.1);
         let ahead = 0.01;
-        let beyond = self.reach(body, settings, &stroke, contact + toward * ahead, Place::Contact, NEAR);
+        let beyond = self.reach(body, settings, &stroke, stroke.pose(ahead), Place::Contact, NEAR);
         let share = body
             .robot
             .joints
@@ -277,10 +279,10 @@ impl Planner {
 
         // The longest wind-up and follow-through there is room for.
         let mut failure = None;
-        let fits = [1.0, 0.8, 0.6, 0.4, 0.2, 0.0].into_iter().find_map(|share| {
+        let fits = [1.0, 0.65, 0.3, 0.0].into_iter().find_map(|share| {
             stroke.windup = s.windup_least + share * (s.windup - s.windup_least);
             self.angles.copy_from_slice(&self.saved);
-            let place = stroke.windup_point();
+            let place = stroke.windup_pose();
             self.reach(body, settings, &stroke, place, Place::WindUp, MIDDLE).map_err(|e| failure = Some(e)).ok()
         });
         if fits.is_none() {
@@ -289,7 +291,7 @@ impl Planner {
         let fits = [1.0, 0.5, 0.0].into_iter().find_map(|share| {
             stroke.follow = s.follow * (0.3 + 0.7 * share);
             self.angles.copy_from_slice(&self.saved);
-            let place = stroke.follow_point();
+            let place = stroke.follow_pose();
             self.reach(body, settings, &stroke, place, Place::FollowThrough, MIDDLE).map_err(|e| failure = Some(e)).ok()
         });
         if fits.is_none() {
@@ -316,11 +318,10 @@ impl Planner {
         body: &Body,
         settings: &DynamicSettings,
         stroke: &Stroke,
-        place: Vector3<f64>,
+        foot: [f64; 5],
         what: Place,
         steps: usize,
     ) -> Result<(), Refusal> {
-        let foot = [place.x, place.y, place.z, stroke.yaw, 0.0];
         let trunk = trunk_support(body, settings, stroke.swing, stroke.yaw);
         let goals = goals(&foot, &trunk);
         let residual = self.ik.solve(&body.tree, &mut self.pose, &mut self.angles, stroke.swing, &goals, steps);
@@ -365,9 +366,10 @@ impl Planner {
         let foot = &body.feet[support as usize];
         let mut time = start;
         let mut fine = 0;
+        let mut zmp = [0.0; 2];
         while time < end {
             let goals = motion.goals(time);
-            let residual = self.ik.solve(&body.tree, &mut self.pose, &mut self.angles, swing, &goals, NEAR);
+            let residual = self.ik.solve(&body.tree, &mut self.pose, &mut self.angles, swing, &goals, WAY);
             let gap = miss(&residual);
             if !matches!(gap.partial_cmp(&limits.reach), Some(o) if o.is_le()) {
                 return Err(Refusal::Unreachable { foot: swing, place: Place::Way, gap });
@@ -387,7 +389,10 @@ impl Planner {
             }
             if quick && fine >= 3 {
                 // The pose is one sample ahead of the middle: good enough for axes of a forecast.
-                let zmp = self.dynamics.solve(body, swing, &self.pose, FINE, false);
+                let now = self.dynamics.solve(body, swing, &self.pose, FINE, false);
+                // To tip takes about sqrt(h / g): what is over sooner does not count in full.
+                let share = if fine == 3 { 1.0 } else { FINE / (TIPPING + FINE) };
+                zmp = [0, 1].map(|k| zmp[k] + share * (now[k] - zmp[k]));
                 let [(speed, fastest), (torque, strongest)] = self.dynamics.shares(&body.robot);
                 // After the contact a joint may lag: nothing depends on it.
                 if time <= contact + FINE {

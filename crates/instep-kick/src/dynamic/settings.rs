@@ -69,6 +69,9 @@ pub struct Swing {
     pub height: f64,
     /// Least height of the sole in the swing, m.
     pub sole_least: f64,
+    /// How much the foot pitches up on its way, rad a metre: relieves the ankle of turning as fast as the shank. The
+    /// foot is level at the contact and turns about the striking face's axis.
+    pub pitch: f64,
     /// Width of the corridor around the x axis in which equation (1) chooses the foot, m.
     pub corridor: f64,
     /// Largest yaw of the foot, rad.
@@ -227,6 +230,7 @@ impl DynamicSettings {
             ("swing.lift", s.lift, 0.005, 0.3),
             ("swing.height", s.height, -0.1, 0.1),
             ("swing.sole_least", s.sole_least, 0.002, 0.2),
+            ("swing.pitch", s.pitch, 0.0, 5.0),
             ("swing.corridor", s.corridor, 0.0, 2.0),
             ("swing.yaw", s.yaw, 0.0, 1.6),
             ("swing.base_yaw", s.base_yaw, 0.0, 1.0),
