@@ -61,7 +61,9 @@ pub(crate) fn reference(solver: &Solver, start: &Retargeted) -> Reference {
                 base_angular_velocity: rounded([v[3], v[4], v[5]], DIGITS),
                 joints: cut(&q[7..], DIGITS),
                 joint_velocities: cut(&v[6..], DIGITS),
-                contacts: (0..robot.contacts.len()).map(|p| around.iter().all(|&k| plan.nodes[k].standing[p])).collect(),
+                contacts: (0..robot.contacts.len())
+                    .map(|p| around.iter().all(|&k| plan.nodes[k].standing[p]))
+                    .collect(),
                 forces,
                 torques: cut(&torques[6..], FORCE_DIGITS),
                 com: rounded(data.com().into(), DIGITS),

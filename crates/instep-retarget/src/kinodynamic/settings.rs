@@ -41,10 +41,10 @@ impl Default for KinodynamicWeights {
             q_v: 1e-5,
             q_h: 1e-4,
             q_f: 1e-3,
-            q_i: [0.05, 0.0, 0.0],
+            q_i: [0.04, 0.0, 0.0],
             q_target: 1.0,
             q_a: 2e-8,
-            q_j: 4e-9,
+            q_j: 5e-9,
             q_tau: 0.0,
         }
     }
@@ -94,7 +94,7 @@ pub struct KinodynamicSettings {
 impl Default for KinodynamicSettings {
     fn default() -> Self {
         Self {
-            rate: 120.0,
+            rate: 150.0,
             time_scale: 1.0,
             weights: KinodynamicWeights::default(),
             min_gap: 0.075,
