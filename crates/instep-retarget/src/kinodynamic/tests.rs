@@ -197,7 +197,7 @@ fn gradients_of_all_rows_are_differences() {
 
     for robot in robots() {
         let start = started(&robot);
-        let settings = KinodynamicSettings { foot_speed: Some(9.0), ..KinodynamicSettings::default() };
+        let settings = KinodynamicSettings { foot_speed: Some(9.0), rate: 120.0, ..KinodynamicSettings::default() };
         let mut settings = settings;
         settings.weights.q_i = [0.3, 0.2, 0.1];
         let plan = Plan::new(&robot, &start, &Weights::default(), &settings).unwrap();
@@ -261,5 +261,76 @@ fn gradients_of_all_rows_are_differences() {
                 "{family} was not tried"
             );
         }
+    }
+}
+
+/// A robot that keeps its standing pose, both feet on the ground.
+fn standing(robot: &Robot) -> crate::kinematic::Retargeted {
+    let mut start = started(robot);
+    let count = start.positions.len();
+    let (first, frame) = (start.positions[0].clone(), start.targets.frames[0].clone());
+    start.positions = vec![first; count];
+    start.targets.frames = vec![frame; count];
+    for foot in &mut start.contacts.feet {
+        foot.heel = vec![true; count];
+        foot.toe = vec![true; count];
+        foot.stance = vec![true; count];
+        foot.stances = vec![instep_motion::contact::Stance { start: 0, end: count - 1 }];
+    }
+    start
+}
+
+fn solve(robot: &Robot, start: &crate::kinematic::Retargeted, stopped: bool) -> super::Kinodynamic {
+    let settings = super::KinodynamicSettings { rate: 60.0, ..Default::default() };
+    let mut settings = settings;
+    settings.weights.q_i = [0.0; 3];
+    let stop = std::sync::atomic::AtomicBool::new(stopped);
+    super::optimize(robot, start, &crate::kinematic::Weights::default(), &settings, &stop, &mut |_| {}).unwrap()
+}
+
+/// Known solution: who stands still is carried by forces that sum to the weight, and stays.
+#[test]
+fn standing_still_is_carried_by_the_weight() {
+    let robot = &robots()[0];
+    let start = standing(robot);
+    let done = solve(robot, &start, false);
+    assert_eq!(done.status, super::Status::Solved, "{:?}", done.violations);
+    let weight = robot.mass() * 9.81;
+    let middle = &done.reference.knots[done.reference.knots.len() / 2];
+    let sum: f64 = middle.forces.iter().map(|f| f[2]).sum();
+    assert!((sum / weight - 1.0).abs() < 0.02, "{sum} N of {weight} N");
+    assert!(done.verification.root_wrench_residual < 0.01);
+    assert_eq!(done.verification.torque_violations, 0);
+    assert_eq!(done, solve(robot, &start, false), "the same again");
+}
+
+#[test]
+fn a_stop_keeps_what_there_is() {
+    let robot = &robots()[0];
+    let done = solve(robot, &standing(robot), true);
+    assert_eq!(done.status, super::Status::Stopped);
+    done.reference.validate().unwrap();
+}
+
+/// Known solutions: a point mass falls freely; a rigid body spins on about a vertical axis only by a torque of I a.
+#[test]
+fn falling_and_spinning_bodies_need_what_they_should() {
+    for robot in robots() {
+        let tree = Tree::new(&robot);
+        let nv = robot.nv();
+        let mut dynamics = Dynamics::new(&tree);
+        let (x, mut v, mut a) = (tree.coordinates(&robot.stand, 0.0), vec![0.0; nv], vec![0.0; nv]);
+        (v[0], v[2], a[2]) = (2.0, 1.0, -9.81);
+        dynamics.compute(&tree, &x, &v, &a, false);
+        assert!(dynamics.force[..6].iter().all(|f| f.abs() < 1e-9), "{:?}", &dynamics.force[..6]);
+        // About the vertical through the base: the force at the centre of mass and the moment that Newton and Euler give.
+        let rate = 3.0;
+        a[3] = rate;
+        dynamics.compute(&tree, &x, &v, &a, true);
+        let inertia = dynamics.by_acceleration[3 * nv + 3];
+        let arm = dynamics.com - nalgebra::Vector3::new(x[0], x[1], x[2]);
+        assert!((dynamics.force[3] - inertia * rate).abs() < 1e-9);
+        assert!((dynamics.force[1] - tree.mass * arm.x * rate).abs() < 1e-9);
+        assert!((dynamics.force[0] + tree.mass * arm.y * rate).abs() < 1e-9);
     }
 }
