@@ -1,6 +1,7 @@
 //! Time and outcome of the kinodynamic stage, by stage: `cargo bench -p instep-retarget --bench kinodynamic -- 10_03`.
 //! Without clips named: all of CMU's subject 10. `--trace` prints every step, `--save FOLDER` keeps the references,
-//! `--settings FILE` reads the stage's settings (JSON is not read; TOML keys as in the documentation).
+//! `--rate`, `--time-scale`, `--friction`,
+//! `--torque-margin`, `--q_i`, `--q_a`, `--q_j`, `--q_m` and `--robot` change what they say.
 //! Skips with a message where the clips are not beside the repository.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a benchmark prints, and stops at the first surprise")]
 
@@ -16,6 +17,14 @@ use instep_robot::Robot;
 
 const ACKNOWLEDGEMENT: &str = "The data used in this project was obtained from mocap.cs.cmu.edu. \
     The database was created with funding from NSF EIA-0196217.";
+
+/// Time that this one thread has spent on a core, s: other programs on the machine do not count.
+fn cpu_seconds() -> f64 {
+    std::fs::read_to_string("/proc/thread-self/schedstat")
+        .ok()
+        .and_then(|text| text.split_whitespace().next().and_then(|ns| ns.parse::<f64>().ok()))
+        .map_or(f64::NAN, |ns| ns * 1e-9)
+}
 
 fn peak_memory() -> String {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
@@ -66,6 +75,7 @@ fn main() {
         let first = retarget(&robot, &clip, source, &kinematic, &mut |_| {}).unwrap();
         let kinematic_time = start.elapsed();
         let start = Instant::now();
+        let cpu = cpu_seconds();
         let stop = AtomicBool::new(false);
         let done = optimize(&robot, &first, &kinematic.weights, &settings, &stop, &mut |p| {
             if trace {
@@ -82,12 +92,14 @@ fn main() {
         })
         .unwrap();
         let seconds = start.elapsed();
+        let cpu = cpu_seconds() - cpu;
         println!(
-            "{name}: {} knots; read {:.2} s, kinematic {:.2} s, kinodynamic {:.2} s in {} steps; memory {}",
+            "{name}: {} knots; read {:.2} s, kinematic {:.2} s, kinodynamic {:.2} s ({:.2} s of a core) in {} steps; memory {}",
             done.reference.knots.len(),
             read.as_secs_f64(),
             kinematic_time.as_secs_f64(),
             seconds.as_secs_f64(),
+            cpu,
             done.iterations,
             peak_memory()
         );

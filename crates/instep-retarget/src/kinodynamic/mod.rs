@@ -20,7 +20,7 @@
 //! r, h, f, torques and the contact schedule are all in the resulting reference.
 //!
 //! The paper's 30 knots a second cannot show what happens in a swing of a tenth of a second; between such knots the
-//! root wrench would be several percent of the weight. The default is 150 nodes a second; the reference has a knot at
+//! root wrench would be several percent of the weight. The default is 180 nodes a second; the reference has a knot at
 //! every node and one half-way to the next.
 //!
 //! | equation | file | |

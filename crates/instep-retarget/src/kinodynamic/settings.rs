@@ -94,7 +94,7 @@ pub struct KinodynamicSettings {
 impl Default for KinodynamicSettings {
     fn default() -> Self {
         Self {
-            rate: 150.0,
+            rate: 180.0,
             time_scale: 1.0,
             weights: KinodynamicWeights::default(),
             min_gap: 0.075,

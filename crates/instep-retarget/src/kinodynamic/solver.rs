@@ -3,7 +3,7 @@
 //! Source: Nocedal and Wright, Numerical Optimization (2006), algorithm 17.4 and section 10.3. Every row is a square
 //! ([`super::terms`]), so the matrix of a step is positive definite whatever rows are redundant. The forces of a node
 //! meet nothing but that node's three coefficients: they are eliminated there (Schur complement), and what is left is
-//! banded with 3 nv diagonals below the main one ([`crate::banded`]). A step of a three-second clip at 150 nodes a second takes about
+//! banded with 3 nv diagonals below the main one ([`crate::banded`]). A step of a three-second clip at 180 nodes a second takes about
 //! a tenth of a second, where one quadratic program of that size took eight seconds in a general sparse solver
 //! (clarabel), and a general interior-point method (POUNCE, Ipopt) 6 to 17 seconds in all at a quarter of the nodes.
 //!
