@@ -17,7 +17,10 @@ fn main() {
     scenarios.retain(|s| wanted[0] == "all" || wanted.contains(&s.name));
     let bench = Bench {
         engines: list(1, "dynamic"),
-        subjects: list(2, "nao,wolfgang").iter().map(|name| Subject::load(Path::new("robots"), name).unwrap()).collect(),
+        subjects: list(2, "nao,wolfgang")
+            .iter()
+            .map(|name| Subject::load(Path::new("robots"), name).unwrap())
+            .collect(),
         scenarios,
         seeds: (1..=number(5, 1)).collect(),
         requests: number(4, 20) as usize,

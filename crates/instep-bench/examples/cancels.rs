@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use instep_bench::{Scenario, Subject};
-use instep_kick::{KickEngine, KickStatus};
+use instep_kick::KickStatus;
 use instep_robot::control::{JointCommand, Sensors};
 use instep_sim::sensors::SensorSuite;
 use instep_sim::{BallState, World};

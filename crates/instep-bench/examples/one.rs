@@ -35,18 +35,28 @@ impl Controller for Shell<'_> {
         let start = std::time::Instant::now();
         self.engine.tick(sensors, command);
         self.tick.push(start.elapsed().as_secs_f64());
-        if self.verbose && self.tick.len() % 8 == 0 {
+        if self.verbose && self.tick.len().is_multiple_of(8) {
             let p = self.engine.progress();
-            let worst = command.positions.iter().zip(&sensors.joint_positions).map(|(a, b)| (a - b).abs()).enumerate()
-                .max_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
+            let worst = command
+                .positions
+                .iter()
+                .zip(&sensors.joint_positions)
+                .map(|(a, b)| (a - b).abs())
+                .enumerate()
+                .max_by(|a, b| a.1.total_cmp(&b.1))
+                .unwrap();
             let o = sensors.orientation;
             println!(
                 "{:.3} {:?} cop L {:?} R {:?} planned {:?} tilt ({:+.3},{:+.3}) worst joint {} {:.3}",
-                sensors.time, p.phase,
+                sensors.time,
+                p.phase,
                 sensors.centre_of_pressure[0].map(|c| c.map(|v| (v * 1e3).round())),
                 sensors.centre_of_pressure[1].map(|c| c.map(|v| (v * 1e3).round())),
                 self.engine.planned().map(|v| (v * 1e3).round()),
-                2.0 * o[1], 2.0 * o[2], worst.0, worst.1
+                2.0 * o[1],
+                2.0 * o[2],
+                worst.0,
+                worst.1
             );
         }
     }
@@ -89,13 +99,37 @@ fn main() {
     let result = run(&robot, &trial, &mut shell).unwrap();
     let took = start.elapsed().as_secs_f64();
     shell.tick.sort_by(f64::total_cmp);
-    println!("tick p50 {:.0} us p99 {:.0} us; trial {took:.2} s", 1e6 * shell.tick[shell.tick.len() / 2], 1e6 * shell.tick[shell.tick.len() * 99 / 100]);
+    println!(
+        "tick p50 {:.0} us p99 {:.0} us; trial {took:.2} s",
+        1e6 * shell.tick[shell.tick.len() / 2],
+        1e6 * shell.tick[shell.tick.len() * 99 / 100]
+    );
     println!("fell {:?} violations {:?}", result.fell_at, result.limit_violations);
-    println!("direction error {:?} deg, launch {:?}", result.direction_error.map(f64::to_degrees), result.launch_angle.map(f64::to_degrees));
+    println!(
+        "direction error {:?} deg, launch {:?}",
+        result.direction_error.map(f64::to_degrees),
+        result.launch_angle.map(f64::to_degrees)
+    );
     if let Some(i) = &result.impact {
-        println!("impact t {:.3} link {} foot {:.2} normal {:.2} ball {:.2} e {:.2} M {:.2} touches {} {}", i.time, i.link, i.foot_speed, i.foot_speed_normal, i.ball_speed(), i.restitution, i.effective_mass, i.touches, result.audit.verdict());
+        println!(
+            "impact t {:.3} link {} foot {:.2} normal {:.2} ball {:.2} e {:.2} M {:.2} touches {} {}",
+            i.time,
+            i.link,
+            i.foot_speed,
+            i.foot_speed_normal,
+            i.ball_speed(),
+            i.restitution,
+            i.effective_mass,
+            i.touches,
+            result.audit.verdict()
+        );
         println!("{}", result.audit.reason());
     }
-    for g in &result.groups { println!("  {:16} {:8} torque {:.2}/{:.2} speed {:.2}/{:.2}", g.group, g.torque_joint, g.torque, g.torque_limit, g.speed, g.speed_limit); }
+    for g in &result.groups {
+        println!(
+            "  {:16} {:8} torque {:.2}/{:.2} speed {:.2}/{:.2}",
+            g.group, g.torque_joint, g.torque, g.torque_limit, g.speed, g.speed_limit
+        );
+    }
     println!("ball end {:?}", result.ball_end);
 }

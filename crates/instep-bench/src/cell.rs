@@ -102,7 +102,7 @@ pub fn run_cell(subject: &Subject, scenario: &Scenario, key: &CellKey) -> Result
             Some(world) if !scenario.varies_world() => world,
             slot => slot.insert(world(subject, scenario, &case)?),
         };
-        let (outcome, plan_time, _) = run_case(subject, scenario, &case, engine.as_mut(), world, &mut ticks)?;
+        let (outcome, plan_time, _) = run_case(subject, &case, engine.as_mut(), world, &mut ticks)?;
         plan_times.push(plan_time);
         outcomes.push(outcome.map_err(|refusal| refusal.name().to_owned()));
     }
@@ -126,18 +126,20 @@ pub fn world(subject: &Subject, scenario: &Scenario, case: &Case) -> Result<Worl
     Ok(World::new(Arc::clone(&subject.robot), &settings)?)
 }
 
+/// The outcome of a case, the time of its plan (s), and the trial of an accepted request.
+pub type Tried = (Result<Kicked, Refusal>, f64, Option<Trial>);
+
 /// Plans and tries one case. Gives the outcome, the time of the plan (s) and the trial of an accepted request.
 ///
 /// # Errors
 /// When the simulation diverges.
 pub fn run_case(
     subject: &Subject,
-    scenario: &Scenario,
     case: &Case,
     engine: &mut dyn KickEngine,
     world: &mut World,
     ticks: &mut Vec<f32>,
-) -> Result<(Result<Kicked, Refusal>, f64, Option<Trial>), BenchError> {
+) -> Result<Tried, BenchError> {
     let robot = &subject.robot;
     let on_ground = |[x, y]: [f64; 2]| [x + subject.footprint[0], y + subject.footprint[1], subject.size.ball];
     let mut ball = BallState::at_rest(on_ground(case.ball));
@@ -181,11 +183,11 @@ pub fn run_case(
     };
     let mut timed = Timed { engine, times: ticks };
     let trial = run_disturbed(world, &settings, &disturbances, &mut timed)?;
-    let kicked = judge(subject, scenario, case, &trial);
+    let kicked = judge(subject, case, &trial);
     Ok((Ok(kicked), plan_time, Some(trial)))
 }
 
-fn judge(subject: &Subject, _scenario: &Scenario, case: &Case, trial: &Trial) -> Kicked {
+fn judge(subject: &Subject, case: &Case, trial: &Trial) -> Kicked {
     let asked_speed = case.request.strength.value();
     let invalid = trial.impact.is_some() && !trial.audit.faults.is_empty();
     let impact = trial.impact.as_ref();

@@ -65,7 +65,8 @@ impl Bench {
         let mut known: BTreeMap<CellKey, CellResult> = BTreeMap::new();
         let mut file = None;
         if let Some(path) = resume {
-            let wrong = |e: std::io::Error| BenchError::File { file: path.display().to_string(), detail: e.to_string() };
+            let wrong =
+                |e: std::io::Error| BenchError::File { file: path.display().to_string(), detail: e.to_string() };
             if let Ok(text) = std::fs::read_to_string(path) {
                 // The last line may have been cut off when the run was stopped; such a cell is run again.
                 let results = text.lines().filter_map(|line| serde_json::from_str::<CellResult>(line).ok());

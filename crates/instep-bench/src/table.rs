@@ -155,8 +155,23 @@ fn row(cells: &[&CellResult], seed: SeedName) -> Row {
 #[must_use]
 pub fn text_table(rows: &[Row]) -> (Vec<&'static str>, Vec<Vec<String>>) {
     let head = vec![
-        "engine", "robot", "scenario", "seed", "requests", "refused", "hit %", "upright %", "ball m/s", "of asked",
-        "dir. median deg", "dir. p90 deg", "rolled m", "contact s", "plan p99 ms", "tick p99 us", "audit invalid",
+        "engine",
+        "robot",
+        "scenario",
+        "seed",
+        "requests",
+        "refused",
+        "hit %",
+        "upright %",
+        "ball m/s",
+        "of asked",
+        "dir. median deg",
+        "dir. p90 deg",
+        "rolled m",
+        "contact s",
+        "plan p99 ms",
+        "tick p99 us",
+        "audit invalid",
         "limit violations",
     ];
     let number = |value: Option<f64>, factor: f64, digits: usize| {
@@ -214,9 +229,7 @@ pub fn csv(rows: &[Row]) -> String {
         let cells = fields.values().map(|value| match value {
             serde_json::Value::Null => String::new(),
             serde_json::Value::String(text) => text.clone(),
-            serde_json::Value::Object(map) => {
-                map.iter().map(|(k, v)| format!("{k}:{v}")).collect::<Vec<_>>().join(" ")
-            }
+            serde_json::Value::Object(map) => map.iter().map(|(k, v)| format!("{k}:{v}")).collect::<Vec<_>>().join(" "),
             other => other.to_string(),
         });
         text += &cells.collect::<Vec<_>>().join(",");

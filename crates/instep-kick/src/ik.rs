@@ -48,7 +48,16 @@ pub struct Weights {
 
 impl Default for Weights {
     fn default() -> Self {
-        Self { position: 100.0, orientation: 30.0, roll: 3.0, height: 4.0, tilt: 2.0, yaw: 0.8, balance: 60.0, damping: 0.03 }
+        Self {
+            position: 100.0,
+            orientation: 30.0,
+            roll: 3.0,
+            height: 4.0,
+            tilt: 2.0,
+            yaw: 0.8,
+            balance: 60.0,
+            damping: 0.03,
+        }
     }
 }
 
@@ -317,16 +326,13 @@ impl Ik {
         for _ in 0..=n {
             self.solve_free(n, &fixed);
             let mut clean = true;
-            for i in 0..n {
-                if fixed[i] {
-                    continue;
-                }
+            for (i, fixed) in fixed.iter_mut().enumerate().take(n).filter(|(_, fixed)| !**fixed) {
                 let x = self.unknowns[i][0].map_or(0.0, |joint| angles[joint]);
                 let [low, high] = self.ranges[i];
                 let (low, high) = ((low - x).clamp(-STEP, 0.0), (high - x).clamp(0.0, STEP));
                 if self.step[i] < low || self.step[i] > high {
                     self.step[i] = self.step[i].clamp(low, high);
-                    fixed[i] = true;
+                    *fixed = true;
                     clean = false;
                 }
             }
@@ -347,8 +353,8 @@ impl Ik {
         let mut right = [0.0; UNKNOWNS];
         for a in 0..count {
             let i = free[a];
-            right[a] = self.gradient[i]
-                - (0..n).filter(|&j| fixed[j]).map(|j| self.normal[i][j] * self.step[j]).sum::<f64>();
+            right[a] =
+                self.gradient[i] - (0..n).filter(|&j| fixed[j]).map(|j| self.normal[i][j] * self.step[j]).sum::<f64>();
         }
         // Cholesky; the damping keeps the matrix positive definite.
         for a in 0..count {

@@ -83,8 +83,7 @@ impl Tree {
                 row[b] = b == link_of[j] || (links[b].parent != 0 && row[links[b].parent]);
             }
         }
-        let mut tree =
-            Self { base: robot.base, links, moves, link_of, mass: robot.mass(), pairs: Vec::new() };
+        let mut tree = Self { base: robot.base, links, moves, link_of, mass: robot.mass(), pairs: Vec::new() };
         tree.pairs = robot.self_collision.iter().map(|pair| pair.map(|geom| tree.capsule(robot, geom))).collect();
         tree
     }
@@ -180,11 +179,7 @@ impl Tree {
     /// Column of the Jacobian of a point of `link` that is now at `point`, m/rad.
     #[must_use]
     pub fn point_column(&self, pose: &TreePose, joint: usize, link: usize, point: &Vector3<f64>) -> Vector3<f64> {
-        if self.moves[joint][link] {
-            pose.axis[joint].cross(&(point - pose.anchor[joint]))
-        } else {
-            Vector3::zeros()
-        }
+        if self.moves[joint][link] { pose.axis[joint].cross(&(point - pose.anchor[joint])) } else { Vector3::zeros() }
     }
 
     /// Column of the Jacobian of `link`'s angular velocity.

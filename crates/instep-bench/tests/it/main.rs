@@ -72,8 +72,20 @@ fn cells_are_the_same_on_one_thread_and_on_two_and_after_a_stop() {
     assert_eq!(rows_over_seeds(&first).len(), 2);
     let object = json(&each);
     for key in [
-        "engine", "robot", "scenario", "seed", "requests", "refused", "hit_rate", "upright_rate", "ball_speed_median",
-        "direction_error_median_deg", "direction_error_p90_deg", "plan_p99_s", "tick_p99_s", "audit_invalid",
+        "engine",
+        "robot",
+        "scenario",
+        "seed",
+        "requests",
+        "refused",
+        "hit_rate",
+        "upright_rate",
+        "ball_speed_median",
+        "direction_error_median_deg",
+        "direction_error_p90_deg",
+        "plan_p99_s",
+        "tick_p99_s",
+        "audit_invalid",
         "limit_violations",
     ] {
         assert!(object["rows"][0].get(key).is_some(), "{key}");

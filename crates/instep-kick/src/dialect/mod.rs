@@ -79,15 +79,8 @@ pub enum DialectError {
 
 impl Dialect {
     /// All of them.
-    pub const ALL: [Self; 7] = [
-        Self::Instep,
-        Self::BitbotsDynamic,
-        Self::Bitbots2026,
-        Self::Booster,
-        Self::Nubots,
-        Self::Naoth,
-        Self::Bhuman,
-    ];
+    pub const ALL: [Self; 7] =
+        [Self::Instep, Self::BitbotsDynamic, Self::Bitbots2026, Self::Booster, Self::Nubots, Self::Naoth, Self::Bhuman];
 
     /// Its name on a command line.
     #[must_use]
@@ -328,7 +321,10 @@ mod tests {
         assert_eq!((b.ball, b.strength), ([0.2, 0.1], Strength::BallSpeed(1.5)));
         let c = parse(Dialect::Booster, r#"{"x":0.3,"y":0.0,"dir":0.2,"goal_x":4,"goal_y":0,"power":2.5}"#);
         assert_eq!((c.direction, c.strength), (0.2, Strength::Distance(2.5)));
-        let d = parse(Dialect::Nubots, r#"{"leg":2,"target":{"x":0.2,"y":-0.1,"z":0},"direction":{"x":0.6,"y":0.8,"z":0}}"#);
+        let d = parse(
+            Dialect::Nubots,
+            r#"{"leg":2,"target":{"x":0.2,"y":-0.1,"z":0},"direction":{"x":0.6,"y":0.8,"z":0}}"#,
+        );
         assert_eq!((d.foot, d.strength), (Some(Side::Right), Strength::BallSpeed(1.0)));
         let e = parse(
             Dialect::Naoth,
@@ -347,8 +343,14 @@ mod tests {
     fn what_cannot_be_read_is_refused_with_its_place() {
         let context = Context::default();
         let odom = r#"{"header":{"frame_id":"odom"},"ball_position":{"x":1,"y":0},"kick_direction":{"z":0,"w":1},"kick_speed":1}"#;
-        assert!(matches!(Dialect::BitbotsDynamic.parse(odom, &context), Err(DialectError::Field { field: "header.frame_id", .. })));
-        assert!(matches!(Dialect::Bitbots2026.parse(r#"{"x":1,"y":0,"strength":3}"#, &context), Err(DialectError::NoBall { .. })));
+        assert!(matches!(
+            Dialect::BitbotsDynamic.parse(odom, &context),
+            Err(DialectError::Field { field: "header.frame_id", .. })
+        ));
+        assert!(matches!(
+            Dialect::Bitbots2026.parse(r#"{"x":1,"y":0,"strength":3}"#, &context),
+            Err(DialectError::NoBall { .. })
+        ));
         assert!(matches!(Dialect::Nubots.parse("{}", &context), Err(DialectError::Parse { .. })));
         for dialect in Dialect::ALL {
             assert!(dialect.parse("not json", &context).is_err(), "{}", dialect.name());

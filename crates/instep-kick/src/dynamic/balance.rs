@@ -89,9 +89,9 @@ impl Balance {
         // To move the centre of mass one way, the centre of pressure must first go the other way by (h / g) times the
         // acceleration: without two poles here the loop would shake itself.
         let share = dt / (self.settings.filter + dt);
-        for k in 0..2 {
-            self.first[k] += share * (wanted[k] - self.first[k]);
-            self.shift[k] += share * (self.first[k] - self.shift[k]);
+        for ((first, shift), wanted) in self.first.iter_mut().zip(&mut self.shift).zip(wanted) {
+            *first += share * (wanted - *first);
+            *shift += share * (*first - *shift);
         }
         self.shift
     }
@@ -133,13 +133,15 @@ mod tests {
     #[test]
     fn a_lean_forward_moves_the_body_back() {
         let pid = Pid { p: 0.3, i: 0.5, d: 0.0, limit: 0.02 };
-        let on = Feedback {
-            on: true, x: pid, y: pid, filter: 0.0, tilt: 1.0, rate: 0.1, moment: 0.5, follow_ball: false,
-        };
+        let on =
+            Feedback { on: true, x: pid, y: pid, filter: 0.0, tilt: 1.0, rate: 0.1, moment: 0.5, follow_ball: false };
         let mut balance = Balance::new(on);
         let shift = balance.shift(Some([0.02, -0.01]), [0.0, 0.0], (true, true), 0.01);
         assert!(shift[0] < 0.0 && shift[1] > 0.0);
-        assert_eq!(Balance::new(Feedback { on: false, ..on }).shift(Some([0.02, 0.0]), [0.0; 2], (true, true), 0.01), [0.0; 2]);
+        assert_eq!(
+            Balance::new(Feedback { on: false, ..on }).shift(Some([0.02, 0.0]), [0.0; 2], (true, true), 0.01),
+            [0.0; 2]
+        );
         let nan = balance.shift(Some([f64::NAN, 0.0]), [0.0; 2], (true, true), 0.01);
         assert!(nan.iter().all(|s| s.is_finite()));
     }

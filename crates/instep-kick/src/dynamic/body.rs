@@ -9,7 +9,6 @@ use nalgebra::{Rotation3, Vector3};
 
 use crate::KickError;
 use crate::dynamic::foot::Foot;
-use crate::ik::Goals;
 use crate::tree::Tree;
 
 /// The robot standing, in the frame of one sole.
@@ -25,19 +24,6 @@ pub(crate) struct Stand {
     pub(crate) base: [f64; 3],
     /// Swing sole's yaw and pitch, rad.
     pub(crate) yaw_pitch: [f64; 2],
-}
-
-impl Stand {
-    /// The goals that hold the stand.
-    pub(crate) fn goals(&self) -> Goals {
-        Goals {
-            position: self.home,
-            yaw_pitch: self.yaw_pitch,
-            balance: [self.com.x, self.com.y],
-            height: self.height,
-            base: self.base,
-        }
-    }
 }
 
 /// A robot with what the engine computes once.

@@ -76,9 +76,7 @@ impl Foot {
                 half_width: 0.5 * (high - low),
             }
         };
-        let ground = || {
-            robot.contacts.iter().filter(|c| c.leg == side).map(|c| turn * (pose.point(&c.at) - sole))
-        };
+        let ground = || robot.contacts.iter().filter(|c| c.leg == side).map(|c| turn * (pose.point(&c.at) - sole));
         let spread = |k: usize| {
             let low = ends.iter().map(|(end, radius)| end[k] - radius).fold(f64::INFINITY, f64::min);
             let high = ends.iter().map(|(end, radius)| end[k] + radius).fold(f64::NEG_INFINITY, f64::max);
@@ -143,7 +141,14 @@ pub fn paper_face(side: Side, direction: f64) -> Face {
 /// Sole's centre and height at the contact with a ball at `ball` (m, any frame) for a kick toward `direction` (rad)
 /// with `face` and the foot's `yaw` (rad); `height` (m) is the sole's.
 #[must_use]
-pub fn contact_point(ball: Vector2<f64>, direction: f64, face: &FacePoint, yaw: f64, height: f64, radius: f64) -> Vector3<f64> {
+pub fn contact_point(
+    ball: Vector2<f64>,
+    direction: f64,
+    face: &FacePoint,
+    yaw: f64,
+    height: f64,
+    radius: f64,
+) -> Vector3<f64> {
     let rise = radius - (height + face.axis.z);
     let reach = radius + face.radius;
     let apart = (reach * reach - rise * rise).max(0.0).sqrt();

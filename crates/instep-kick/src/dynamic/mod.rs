@@ -38,9 +38,7 @@ use motion::{Motion, Stroke};
 use plan::Planner;
 use torque::Dynamics;
 
-pub use settings::{
-    Accuracy, BallModel, DynamicSettings, Feedback, Limits, Pid, Stance, Swing, Times,
-};
+pub use settings::{Accuracy, BallModel, DynamicSettings, Feedback, Limits, Pid, Stance, Swing, Times};
 
 /// Steps of inverse kinematics in a tick.
 const TICK_STEPS: usize = 3;
@@ -92,11 +90,8 @@ impl DynamicKick {
     pub fn new(robot: Arc<Robot>, settings: DynamicSettings) -> Result<Self, KickError> {
         settings.validate()?;
         let ik = Ik::new(&robot, &settings.coupled, settings.limits.joint_margin)?;
-        let coupled: Vec<[usize; 2]> = settings
-            .coupled
-            .iter()
-            .filter_map(|[a, b]| Some([robot.joint_index(a)?, robot.joint_index(b)?]))
-            .collect();
+        let coupled: Vec<[usize; 2]> =
+            settings.coupled.iter().filter_map(|[a, b]| Some([robot.joint_index(a)?, robot.joint_index(b)?])).collect();
         let body = Body::new(Arc::clone(&robot), &settings.arms)?;
         let planner = Planner::new(&body, &settings, ik.clone(), Dynamics::new(&robot, coupled.clone()));
         let motion = Motion::standing(&body, Side::Right);
@@ -199,7 +194,8 @@ impl DynamicKick {
                     let residual =
                         self.ik.solve(tree, &mut self.probe, &mut self.probe_angles, swing, &goals, PROBE_STEPS);
                     let limits = &self.settings.limits;
-                    let fine = plan::miss(&residual) < limits.reach && tree.least_gap(&self.probe).0 >= limits.clearance;
+                    let fine =
+                        plan::miss(&residual) < limits.reach && tree.least_gap(&self.probe).0 >= limits.clearance;
                     follow.candidate = fine.then_some((candidate, ball, good + 1));
                 } else {
                     self.motion = self.motion.retargeted(&self.body, &self.settings, time, &candidate);

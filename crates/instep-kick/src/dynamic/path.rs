@@ -10,7 +10,7 @@ const SEGMENTS: usize = 12;
 
 /// A curve in `D` coordinates.
 #[derive(Debug, Clone, Copy)]
-pub struct Path<const D: usize> {
+pub(crate) struct Path<const D: usize> {
     segments: [Option<(f64, Quintic<D>)>; SEGMENTS],
     count: usize,
     end: f64,
@@ -20,12 +20,12 @@ pub struct Path<const D: usize> {
 impl<const D: usize> Path<D> {
     /// Starts at `time` (s) in `state`.
     #[must_use]
-    pub fn starting(time: f64, state: State<D>) -> Self {
+    pub(crate) fn starting(time: f64, state: State<D>) -> Self {
         Self { segments: [None; SEGMENTS], count: 0, end: time, last: state }
     }
 
     /// Goes on to `state` within `duration` (s). Too short a duration, or one segment too many, only replaces the end.
-    pub fn to(&mut self, duration: f64, state: State<D>) {
+    pub(crate) fn to(&mut self, duration: f64, state: State<D>) {
         if self.count < SEGMENTS
             && let Ok(segment) = Quintic::between(duration, &self.last, &state)
         {
@@ -37,25 +37,25 @@ impl<const D: usize> Path<D> {
     }
 
     /// Stays where it is for `duration` (s).
-    pub fn hold(&mut self, duration: f64) {
+    pub(crate) fn hold(&mut self, duration: f64) {
         self.to(duration, State::at_rest(self.last.position));
     }
 
     /// When it ends, s.
     #[must_use]
-    pub fn end(&self) -> f64 {
+    pub(crate) fn end(&self) -> f64 {
         self.end
     }
 
     /// The state at the end.
     #[must_use]
-    pub fn last(&self) -> State<D> {
+    pub(crate) fn last(&self) -> State<D> {
         self.last
     }
 
     /// State at `time` (s).
     #[must_use]
-    pub fn at(&self, time: f64) -> State<D> {
+    pub(crate) fn at(&self, time: f64) -> State<D> {
         if time >= self.end || self.count == 0 {
             return State::at_rest(self.last.position);
         }

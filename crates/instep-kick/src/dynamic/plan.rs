@@ -38,13 +38,12 @@ const COARSE: f64 = 0.04;
 /// Least and greatest angle from the foot's x axis at which a corner strikes, rad.
 const CORNER: [f64; 2] = [0.0, 1.3];
 
-/// What a candidate looks like at its three places.
+/// A foot and face that reach the three places.
 #[derive(Debug, Clone, Copy)]
 struct Candidate {
     stroke: Stroke,
     /// Lower is better.
     cost: f64,
-    effective_mass: f64,
     ball_speed: f64,
 }
 
@@ -188,9 +187,7 @@ impl Planner {
                     };
                     return Ok(Planned { motion, stroke: candidate.stroke, plan });
                 }
-                Err(cause) => {
-                    refusal = Some(graver(refusal, cause))
-                },
+                Err(cause) => refusal = Some(graver(refusal, cause)),
             }
         }
         Err(refusal.unwrap_or(Refusal::Unreachable { foot: Side::Right, place: Place::Contact, gap: f64::INFINITY }))
@@ -260,7 +257,8 @@ impl Planner {
         let strike = contact + nalgebra::Rotation3::from_axis_angle(&Vector3::z_axis(), yaw) * point.axis;
         let mass = self.dynamics.effective_mass(body.robot.leg(swing).foot, &strike, &toward);
         let ball_speed = wanted_speed(mass);
-        let change = (Vector2::new(request.direction.cos(), request.direction.sin()) * ball_speed - ball_velocity).norm();
+        let change =
+            (Vector2::new(request.direction.cos(), request.direction.sin()) * ball_speed - ball_velocity).norm();
         let along = ball_velocity.dot(&toward.xy());
         stroke.speed = (change / gain(settings, mass) * settings.ball.speed_gain + along).max(0.1);
         let ahead = 0.01;
@@ -300,16 +298,16 @@ impl Planner {
         let paper = paper_choice(request.ball, request.direction, s.corridor);
         let mut cost = share.0 / settings.limits.speed;
         cost += 0.8 * (1.0 - stroke.windup / s.windup) + 0.3 * (1.0 - stroke.follow / s.follow);
-        cost += 0.4 * yaw.abs() / FRAC_PI_4 + match face {
-            Face::Front => 0.0,
-            Face::Inner | Face::Outer => 0.3,
-            Face::Corner => 0.5,
-        };
+        cost += 0.4 * yaw.abs() / FRAC_PI_4
+            + match face {
+                Face::Front => 0.0,
+                Face::Inner | Face::Outer => 0.3,
+                Face::Corner => 0.5,
+            };
         cost += 0.3 * (1.0 - limit / 0.1).clamp(0.0, 1.0);
         cost -= if paper == swing { 0.15 } else { 0.0 };
         cost -= if paper_face(swing, request.direction) == face { 0.15 } else { 0.0 };
-        Some(Ok(Candidate { stroke, cost, effective_mass: mass, ball_speed })
-            .inspect(|c: &Candidate| debug_assert!(c.effective_mass > 0.0)))
+        Some(Ok(Candidate { stroke, cost, ball_speed }))
     }
 
     /// Moves the foot to `place` by inverse kinematics and judges the pose.
@@ -478,4 +476,3 @@ fn graver(old: Option<Refusal>, new: Refusal) -> Refusal {
         _ => new,
     }
 }
-

@@ -263,7 +263,8 @@ impl DynamicSettings {
             within(field, value, low, high)?;
         }
         for (axis, pid) in [("x", &f.x), ("y", &f.y)] {
-            for (part, value, high) in [("p", pid.p, 10.0), ("i", pid.i, 50.0), ("d", pid.d, 5.0), ("limit", pid.limit, 0.2)]
+            for (part, value, high) in
+                [("p", pid.p, 10.0), ("i", pid.i, 50.0), ("d", pid.d, 5.0), ("limit", pid.limit, 0.2)]
             {
                 within(&format!("feedback.{axis}.{part}"), value, 0.0, high)?;
             }

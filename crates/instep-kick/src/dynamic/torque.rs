@@ -6,8 +6,8 @@
 //! is shared by the lever rule; the joint torques then follow from J^T. The torques let weak, soft drives follow.
 
 use instep_motion::phase::Side;
-use instep_robot::{Robot, RobotData};
 use instep_robot::control::torque_range;
+use instep_robot::{Robot, RobotData};
 use nalgebra::{Rotation3, UnitQuaternion, Vector3};
 
 use crate::dynamic::body::Body;
@@ -105,10 +105,9 @@ impl Dynamics {
         let rest = moment - swing_point.cross(&(force * (1.0 - share)));
         self.torques.copy_from_slice(&self.generalised[6..]);
         let into_base = turn.inverse();
-        for (side, force, moment) in [
-            (swing.other(), force * share, rest * share),
-            (swing, force * (1.0 - share), rest * (1.0 - share)),
-        ] {
+        for (side, force, moment) in
+            [(swing.other(), force * share, rest * share), (swing, force * (1.0 - share), rest * (1.0 - share))]
+        {
             // Both in the base frame, about the sole's centre.
             let link = body.robot.leg(side).sole.link;
             let at = pose.point(&body.robot.leg(side).sole);

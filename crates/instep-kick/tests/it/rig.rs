@@ -11,17 +11,17 @@ use instep_sim::sensors::SensorSuite;
 use instep_sim::settings::{Ball, WorldSettings};
 use instep_sim::{BallState, World};
 
-pub fn robot(name: &str) -> Arc<Robot> {
+pub(crate) fn robot(name: &str) -> Arc<Robot> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots").join(name);
     Arc::new(Robot::load(&folder).unwrap())
 }
 
-pub fn engine(name: &str) -> DynamicKick {
+pub(crate) fn engine(name: &str) -> DynamicKick {
     DynamicKick::load(robot(name)).unwrap()
 }
 
 /// Sensors of the robot standing still.
-pub fn standing(robot: &Robot) -> Sensors {
+pub(crate) fn standing(robot: &Robot) -> Sensors {
     Sensors {
         joint_positions: robot.stand[7..].to_vec(),
         joint_velocities: vec![0.0; robot.joints.len()],
@@ -33,24 +33,24 @@ pub fn standing(robot: &Robot) -> Sensors {
 }
 
 /// A request that both small robots can do.
-pub fn request(name: &str) -> KickRequest {
+pub(crate) fn request(name: &str) -> KickRequest {
     match name {
         "nao" => KickRequest::new([0.17, -0.05], 0.0, 0.7),
         _ => KickRequest::new([0.24, -0.07], 0.0, 0.8),
     }
 }
 
-pub struct Rig {
-    pub engine: DynamicKick,
-    pub world: World,
+pub(crate) struct Rig {
+    pub(crate) engine: DynamicKick,
+    pub(crate) world: World,
     suite: SensorSuite,
-    pub sensors: Sensors,
-    pub command: JointCommand,
+    pub(crate) sensors: Sensors,
+    pub(crate) command: JointCommand,
     far: usize,
 }
 
 impl Rig {
-    pub fn new(name: &str, ball: [f64; 2]) -> Self {
+    pub(crate) fn new(name: &str, ball: [f64; 2]) -> Self {
         let engine = engine(name);
         let robot = robot(name);
         let model = engine.settings().ball;
@@ -70,7 +70,7 @@ impl Rig {
     }
 
     /// One control period.
-    pub fn tick(&mut self) {
+    pub(crate) fn tick(&mut self) {
         use instep_robot::control::Controller;
         self.suite.read_into(self.world.time(), &mut self.sensors);
         self.engine.tick(&self.sensors, &mut self.command);
@@ -81,7 +81,7 @@ impl Rig {
     }
 
     /// Whether the robot stands on both feet in its standing pose.
-    pub fn stands(&self) -> bool {
+    pub(crate) fn stands(&self) -> bool {
         let robot = self.world.robot();
         let mut forces = vec![nalgebra::Vector3::zeros(); robot.contacts.len()];
         self.world.contact_forces_into(&mut forces);

@@ -5,10 +5,10 @@ use std::process::ExitCode;
 
 use instep_bench::Subject;
 use instep_bench::cell::{Kicked, run_case};
-use instep_bench::scenario::{Case, Scenario};
+use instep_bench::scenario::Case;
 use instep_kick::{KickRequest, Strength};
 use instep_sim::World;
-use instep_sim::settings::{ModelError, SensorNoise, WorldSettings};
+use instep_sim::settings::{ModelError, WorldSettings};
 use serde::Serialize;
 
 use crate::failure::Failure;
@@ -57,7 +57,6 @@ pub(super) fn run(
     let mut settings = world.unwrap_or_else(|| subject.world());
     settings.ball = subject.world().ball;
     let mut world = World::new(subject.robot.clone(), &settings)?;
-    let scenario = scenario(settings.sensors);
     let mut answers = Vec::with_capacity(requests.len());
     for request in requests {
         let mut engine = subject.engine(engine)?;
@@ -71,7 +70,7 @@ pub(super) fn run(
             ball_moved: None,
             seed,
         };
-        let (outcome, plan_s, _) = run_case(subject, &scenario, &case, engine.as_mut(), &mut world, &mut Vec::new())?;
+        let (outcome, plan_s, _) = run_case(subject, &case, engine.as_mut(), &mut world, &mut Vec::new())?;
         let refused = outcome.as_ref().err().map(|r| Refused { cause: r.name(), message: r.to_string() });
         let kicked = outcome.ok();
         let direction_error_deg = kicked.and_then(|k| k.direction_error).map(f64::to_degrees);
@@ -95,19 +94,6 @@ fn line(answer: &Answer) -> String {
     let error = answer.direction_error_deg.map_or_else(String::new, |e| format!(", {e:+.1} deg off"));
     let stands = if kicked.upright { "stands" } else { "fell" };
     format!("{place}{speed}{error}, rolls {:.2} m, {stands}\n", kicked.distance)
-}
-
-fn scenario(sensors: SensorNoise) -> Scenario {
-    Scenario {
-        name: "request".into(),
-        title: String::new(),
-        ball: instep_bench::scenario::BallPlace { gap: [0.0; 2], lateral: [0.0; 2] },
-        kick: instep_bench::scenario::Kick { direction_deg: [0.0; 2], speed: [1.0; 2] },
-        sensors,
-        pitch: Default::default(),
-        model: Default::default(),
-        disturbance: Default::default(),
-    }
 }
 
 /// The requests of a file: a JSON array of requests, or one a line.
