@@ -41,10 +41,9 @@ impl Playback {
             .joints
             .iter()
             .map(|joint| {
-                reference.joint_index(&joint.name).ok_or_else(|| KickError::MissingJoint {
-                    joint: joint.name.clone(),
-                    robot: robot.name.clone(),
-                })
+                reference
+                    .joint_index(&joint.name)
+                    .ok_or_else(|| KickError::MissingJoint { joint: joint.name.clone(), robot: robot.name.clone() })
             })
             .collect::<Result<_, _>>()?;
         let torques = if reference.knots.iter().all(|knot| knot.torques.len() == reference.joint_names.len()) {
