@@ -60,11 +60,8 @@ pub(crate) fn independent(robot: &Robot, offsets: &[Vector3<f64>], standing: &[u
         let across = Vector3::new(-along.y, along.x, 0.0);
         rows.extend([(second, across), (second, Vector3::z())]);
         let beside = |p: usize| from(p).perp(&along).abs();
-        if let Some(&third) = points[1..].iter().max_by(|a, b| beside(**a).total_cmp(&beside(**b))) {
-            if beside(third) > 1e-4 {
-                rows.push((third, Vector3::z()));
-            }
-        }
+        let third = points[1..].iter().copied().max_by(|a, b| beside(*a).total_cmp(&beside(*b)));
+        rows.extend(third.filter(|&p| beside(p) > 1e-4).map(|p| (p, Vector3::z())));
     }
     rows
 }

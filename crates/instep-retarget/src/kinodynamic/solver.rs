@@ -406,10 +406,8 @@ impl<'a, 'b> Solver<'a, 'b> {
         // What was best after a round, unless the present is better still.
         let worst = self.violations(false);
         let now = self.real(&worst);
-        if let Some((least, unknowns)) = best {
-            if !(now <= least) {
-                self.x = unknowns;
-            }
+        if let Some((_, unknowns)) = best.filter(|(least, _)| now.is_nan() || now > *least) {
+            self.x = unknowns;
         }
         end
     }

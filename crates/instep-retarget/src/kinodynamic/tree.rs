@@ -119,8 +119,8 @@ impl Tree {
             });
         }
         let mut support: Vec<Vec<usize>> = Vec::new();
-        for i in 0..nv {
-            let mut chain: Vec<usize> = parents[i].map(|p: usize| support[p].clone()).unwrap_or_default();
+        for (i, parent) in parents.iter().enumerate() {
+            let mut chain: Vec<usize> = parent.map(|p: usize| support[p].clone()).unwrap_or_default();
             chain.push(i);
             support.push(chain);
         }
