@@ -4,7 +4,7 @@
 //! ([`super::terms`]), so the matrix of a step is positive definite whatever rows are redundant. The forces of a node
 //! meet nothing but that node's three coefficients: they are eliminated there (Schur complement), and what is left is
 //! banded with 3 nv diagonals below the main one ([`crate::banded`]). A step of a three-second clip at 180 nodes a second takes about
-//! a tenth of a second, where one quadratic program of that size took eight seconds in a general sparse solver
+//! 0.28 s of a core, where one quadratic program of that size took eight seconds in a general sparse solver
 //! (clarabel), and a general interior-point method (POUNCE, Ipopt) 6 to 17 seconds in all at a quarter of the nodes.
 //!
 //! Rounds: minimise for fixed multipliers, move the multipliers, raise the penalty of the families that break their real
