@@ -71,7 +71,9 @@ fn one(subject: &Subject, scenario: &Scenario, world: &mut World, seed: u64) -> 
                 suite.sense(world);
             }
         }
-        return Some((share, engine.progress().status == KickStatus::Cancelled && stands(world)));
+        // A cancel that comes when the motion is over finds it finished.
+        let over = matches!(engine.progress().status, KickStatus::Cancelled | KickStatus::Finished);
+        return Some((share, over && stands(world)));
     }
     None
 }

@@ -111,11 +111,11 @@ pub struct Ik {
 
 impl Ik {
     /// For `robot`, whose pairs of joints in `coupled` are turned by one motor each; `margin` (rad) is kept from every
-    /// joint limit.
+    /// joint limit, and knees are kept bent by `bend` (rad) at least: a straight leg cannot follow.
     ///
     /// # Errors
     /// When a coupled joint is not there, or the legs have more than fourteen joints.
-    pub fn new(robot: &Robot, coupled: &[[String; 2]], margin: f64) -> Result<Self, KickError> {
+    pub fn new(robot: &Robot, coupled: &[[String; 2]], margin: f64, bend: f64) -> Result<Self, KickError> {
         let mut unknowns: Vec<[Option<usize>; 2]> = Vec::new();
         for leg in &robot.legs {
             // The toe keeps its standing angle.
@@ -154,6 +154,14 @@ impl Ik {
                 for joint in joints.iter().flatten() {
                     let [low, high] = robot.joints[*joint].range;
                     range = [range[0].max(low + margin), range[1].min(high - margin)];
+                    // A knee bends toward the far end of its range.
+                    if robot.legs.iter().any(|leg| leg.knee == *joint) {
+                        if high > -low {
+                            range[0] = range[0].max(bend);
+                        } else {
+                            range[1] = range[1].min(-bend);
+                        }
+                    }
                 }
                 range
             })

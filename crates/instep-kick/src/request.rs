@@ -169,6 +169,16 @@ pub enum Refusal {
         /// Index of that joint.
         joint: usize,
     },
+    /// The motors cannot hold the robot on one foot in a pose on the way.
+    #[error("with the {foot} foot the joint {joint} would have to hold {share:.2} times what its motor can")]
+    TooHeavy {
+        /// The kicking foot.
+        foot: Side,
+        /// Largest share of a motor's torque at rest.
+        share: f64,
+        /// Index of that joint.
+        joint: usize,
+    },
     /// The planned centre of pressure leaves the support foot.
     #[error("with the {foot} foot the robot would tip: centre of pressure {by:.3} m outside the support foot")]
     OffBalance {
@@ -219,6 +229,7 @@ impl Refusal {
             Self::Unreachable { .. } => "unreachable",
             Self::SelfCollision { .. } => "self_collision",
             Self::TooFast { .. } => "too_fast",
+            Self::TooHeavy { .. } => "too_heavy",
             Self::OffBalance { .. } => "off_balance",
             Self::TooLate { .. } => "too_late",
             Self::TooImprecise { .. } => "too_imprecise",

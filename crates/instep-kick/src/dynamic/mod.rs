@@ -89,7 +89,7 @@ impl DynamicKick {
     /// When a setting cannot be or does not fit the robot.
     pub fn new(robot: Arc<Robot>, settings: DynamicSettings) -> Result<Self, KickError> {
         settings.validate()?;
-        let ik = Ik::new(&robot, &settings.coupled, settings.limits.joint_margin)?;
+        let ik = Ik::new(&robot, &settings.coupled, settings.limits.joint_margin, settings.limits.knee_bend)?;
         let coupled: Vec<[usize; 2]> =
             settings.coupled.iter().filter_map(|[a, b]| Some([robot.joint_index(a)?, robot.joint_index(b)?])).collect();
         let body = Body::new(Arc::clone(&robot), &settings.arms)?;

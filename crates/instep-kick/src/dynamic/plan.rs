@@ -33,7 +33,7 @@ const WAY: usize = 2;
 const TIPPING: f64 = 0.04;
 /// Sampling of the forecast, s: in the kick, and elsewhere.
 const FINE: f64 = 0.016;
-const COARSE: f64 = 0.04;
+const COARSE: f64 = 0.03;
 
 /// Least and greatest angle from the foot's x axis at which a corner strikes, rad.
 const CORNER: [f64; 2] = [0.0, 1.3];
@@ -365,6 +365,7 @@ impl Planner {
         let mut time = start;
         let mut fine = 0;
         let mut zmp = [0.0; 2];
+        let mut last: Option<f64> = None;
         while time < end {
             let goals = motion.goals(time);
             let residual = self.ik.solve(&body.tree, &mut self.pose, &mut self.angles, swing, &goals, WAY);
@@ -384,6 +385,27 @@ impl Planner {
                     self.dynamics.push(body, support, &self.angles, &self.pose);
                 }
                 fine += 1;
+            }
+            // Between the samples, in the slow parts too, no joint may jump from one solution to another.
+            if let Some(last) = last {
+                let most = self
+                    .ik
+                    .joints()
+                    .map(|j| ((self.angles[j] - self.saved[j]).abs() / (time - last) / body.robot.joints[j].speed, j));
+                let (share, joint) = most.fold((0.0, 0), |a, b| if b.0 > a.0 { b } else { a });
+                if time <= contact && share > limits.speed || share > 1.5 * limits.speed {
+                    return Err(Refusal::TooFast { foot: swing, asked: stroke.speed, share, joint });
+                }
+            }
+            self.saved.copy_from_slice(&self.angles);
+            last = Some(time);
+            if !quick {
+                self.dynamics.fill(body, support, &self.angles, &self.pose);
+                self.dynamics.solve(body, swing, &self.pose, FINE, false);
+                let [_, (share, joint)] = self.dynamics.shares(&body.robot);
+                if share > limits.hold {
+                    return Err(Refusal::TooHeavy { foot: swing, share, joint });
+                }
             }
             if quick && fine >= 3 {
                 // The pose is one sample ahead of the middle: good enough for axes of a forecast.
@@ -467,7 +489,7 @@ fn graver(old: Option<Refusal>, new: Refusal) -> Refusal {
         Refusal::Unreachable { place: Place::Contact, gap, .. } => -gap.min(10.0),
         Refusal::Unreachable { gap, .. } => 1.0 - gap.min(0.9),
         Refusal::SelfCollision { .. } => 2.0,
-        Refusal::OffBalance { .. } => 3.0,
+        Refusal::OffBalance { .. } | Refusal::TooHeavy { .. } => 3.0,
         Refusal::TooFast { share, .. } => 5.0 - (share / 100.0).min(0.9),
         _ => 9.0,
     };

@@ -122,8 +122,12 @@ pub struct Limits {
     pub speed: f64,
     /// Largest planned share of a motor's torque at its speed.
     pub torque: f64,
+    /// Largest share of a motor's torque that holding a pose on one foot may take.
+    pub hold: f64,
     /// Kept from every joint limit, rad.
     pub joint_margin: f64,
+    /// Least bend of the knees, rad: near a straight leg small ways ask for great joint speeds.
+    pub knee_bend: f64,
     /// Largest miss of the planned foot, m.
     pub reach: f64,
     /// Least gap between parts of the robot, m.
@@ -248,7 +252,9 @@ impl DynamicSettings {
             ("stance.roll", self.stance.roll, -0.5, 0.5),
             ("limits.speed", l.speed, 0.05, 2.0),
             ("limits.torque", l.torque, 0.05, 2.0),
+            ("limits.hold", l.hold, 0.05, 2.0),
             ("limits.joint_margin", l.joint_margin, 0.0, 0.2),
+            ("limits.knee_bend", l.knee_bend, 0.0, 1.0),
             ("limits.reach", l.reach, 1e-4, 0.05),
             ("limits.clearance", l.clearance, -0.01, 0.1),
             ("limits.edge", l.edge, -0.2, 0.1),

@@ -55,7 +55,7 @@ fn it_finds_poses_that_exist_and_keeps_limits_for_those_that_do_not() {
     for name in ["wolfgang", "prestoe"] {
         let robot = robot(name);
         let tree = Tree::new(&robot);
-        let mut ik = Ik::new(&robot, &[], 0.0).unwrap();
+        let mut ik = Ik::new(&robot, &[], 0.0, 0.0).unwrap();
         let mut pose = tree.pose();
         for round in 0..100 {
             let mut wanted = robot.stand[7..].to_vec();
