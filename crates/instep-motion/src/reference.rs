@@ -24,6 +24,9 @@ pub enum ReferenceKind {
     Kinematic,
     /// Consistent with the robot's centroidal dynamics and its limits.
     Kinodynamic,
+    /// The best that the kinodynamic stage found where it did not get that far: some law or limit is broken, and no
+    /// robot can do it as it stands.
+    Infeasible,
 }
 
 /// What a reference was computed from, for its card and for the error that names it.

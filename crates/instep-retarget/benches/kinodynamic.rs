@@ -1,7 +1,7 @@
 //! Time and outcome of the kinodynamic stage, by stage: `cargo bench -p instep-retarget --bench kinodynamic -- 10_03`.
 //! Without clips named: all of CMU's subject 10. `--trace` prints every step, `--save FOLDER` keeps the references,
-//! `--rate`, `--time-scale`, `--friction`,
-//! `--torque-margin`, `--q_i`, `--q_a`, `--q_j`, `--q_m` and `--robot` change what they say.
+//! `--rate`, `--time-scale`, `--friction`, `--torque-margin`, `--q_i`, `--q_a`, `--q_j`, `--q_m`, `--q_ball` and
+//! `--robot` change what they say.
 //! Skips with a message where the clips are not beside the repository.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a benchmark prints, and stops at the first surprise")]
 
@@ -12,7 +12,7 @@ use std::time::Instant;
 use instep_motion::asf;
 use instep_motion::reference::Source;
 use instep_retarget::kinematic::{KinematicSettings, retarget};
-use instep_retarget::kinodynamic::{KinodynamicSettings, optimize};
+use instep_retarget::kinodynamic::{KinodynamicSettings, Work, optimize};
 use instep_robot::Robot;
 
 const ACKNOWLEDGEMENT: &str = "The data used in this project was obtained from mocap.cs.cmu.edu. \
@@ -57,6 +57,7 @@ fn main() {
     number("--q_a", &mut settings.weights.q_a);
     number("--q_j", &mut settings.weights.q_j);
     number("--q_m", &mut settings.weights.q_m);
+    number("--q_ball", &mut settings.weights.q_ball);
     let robot = Robot::load(&root.join("robots").join(after("--robot").unwrap_or("prestoe".into()))).unwrap();
     let named: Vec<&str> = args.iter().map(String::as_str).filter(|a| a.starts_with("10_")).collect();
     let all = ["10_01", "10_02", "10_03", "10_05", "10_06"];
@@ -72,12 +73,21 @@ fn main() {
         };
         let kinematic = KinematicSettings::default();
         let start = Instant::now();
-        let first = retarget(&robot, &clip, source, &kinematic, &mut |_| {}).unwrap();
-        let kinematic_time = start.elapsed();
+        let mut rescaling = None;
+        let first = retarget(&robot, &clip, source, &kinematic, &mut |_| {
+            rescaling.get_or_insert_with(|| start.elapsed());
+        })
+        .unwrap();
+        let rescaling = rescaling.unwrap_or_default();
+        let kinematic_time = start.elapsed() - rescaling;
         let start = Instant::now();
         let cpu = cpu_seconds();
         let stop = AtomicBool::new(false);
+        let mut verifying = start.elapsed();
         let done = optimize(&robot, &first, &kinematic.weights, &settings, &stop, &mut |p| {
+            if p.work == Work::Verification {
+                verifying = start.elapsed();
+            }
             if trace {
                 println!(
                     "  {:>7.2} s step {:>3} round {:>2} cost {:>10.5} worst {:.2e} {}",
@@ -94,11 +104,15 @@ fn main() {
         let seconds = start.elapsed();
         let cpu = cpu_seconds() - cpu;
         println!(
-            "{name}: {} knots; read {:.2} s, kinematic {:.2} s, kinodynamic {:.2} s ({:.2} s of a core) in {} steps; memory {}",
+            "{name}: {} knots at {} Hz; read {:.2} s, rescaling {:.2} s, kinematic {:.2} s, kinodynamic {:.2} s, \
+             verification {:.2} s ({:.2} s of a core for the last two) in {} steps; memory {}",
             done.reference.knots.len(),
+            done.reference.rate,
             read.as_secs_f64(),
+            rescaling.as_secs_f64(),
             kinematic_time.as_secs_f64(),
-            seconds.as_secs_f64(),
+            verifying.as_secs_f64(),
+            (seconds - verifying).as_secs_f64(),
             cpu,
             done.iterations,
             peak_memory()
@@ -121,9 +135,10 @@ fn main() {
             v.friction
         );
         println!(
-            "  foot {:.2} m/s at impact (kinematic {:.2}); approach {:.1} deg, aim turned {:.2} deg; binding {:?}",
+            "  foot {:.2} m/s at impact (kinematic {:.2}), {:.1} mm off; approach {:.1} deg, turned {:.2} deg; binding {:?}",
             done.foot_speed_at_impact,
             done.kinematic_foot_speed,
+            1e3 * done.ball_miss,
             done.approach_angle.to_degrees(),
             done.aim_turn.to_degrees(),
             done.binding.iter().map(|b| format!("{} {} {:.2}", b.joint, b.limit, b.share)).collect::<Vec<_>>()

@@ -163,11 +163,11 @@ pub enum Status {
 /// How far the stage has come.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Progress {
-    /// Iterations done.
+    /// Iterations done; 0 once the clip is rescaled.
     pub iteration: usize,
     /// Most iterations.
     pub iterations: usize,
-    /// Weighted cost after it.
+    /// Weighted cost after it; infinite before the first.
     pub cost: f64,
 }
 
@@ -227,6 +227,8 @@ pub fn retarget(
     if settings.form == ContactForm::Enforced {
         settle(robot, &mut targets, &contacts);
     }
+
+    progress(Progress { iteration: 0, iterations: settings.iterations, cost: f64::INFINITY });
 
     let stances = stances(robot, &contacts);
     let anchors = match settings.form {

@@ -69,7 +69,7 @@ pub(crate) struct Kick {
 }
 
 /// `x,y` in metres.
-fn point(text: &str) -> Result<[f64; 2], String> {
+pub(crate) fn point(text: &str) -> Result<[f64; 2], String> {
     let number = |part: &str| part.trim().parse::<f64>().ok().filter(|x| x.is_finite());
     text.split_once(',')
         .and_then(|(x, y)| Some([number(x)?, number(y)?]))
@@ -77,7 +77,7 @@ fn point(text: &str) -> Result<[f64; 2], String> {
 }
 
 /// `10deg`, `10` (both degrees) or `0.17rad`; gives radians.
-fn degrees(text: &str) -> Result<f64, String> {
+pub(crate) fn degrees(text: &str) -> Result<f64, String> {
     let text = text.trim();
     let (number, factor) = match text.strip_suffix("rad") {
         Some(number) => (number, 1.0),
@@ -194,6 +194,7 @@ impl Tried {
             ReferenceKind::KinematicSlip => "kinematic, the clip's foot slip kept",
             ReferenceKind::Kinematic => "kinematic, stance feet still",
             ReferenceKind::Kinodynamic => "kinodynamic",
+            ReferenceKind::Infeasible => "kinodynamic, but not feasible",
         }
     }
 }

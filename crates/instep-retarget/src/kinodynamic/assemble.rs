@@ -8,6 +8,7 @@ use nalgebra::{Matrix6, Vector3, Vector6};
 use super::approach;
 use super::inverse_dynamics::Dynamics;
 use super::plan::Plan;
+use super::settings::KinodynamicSettings;
 use super::solver::Solver;
 use super::terms::{Family, Worst};
 use crate::kinematic::Retargeted;
@@ -154,6 +155,15 @@ pub(crate) fn foot_speed(solver: &Solver) -> f64 {
     chain.iter().map(|&i| plan.tree.column(&pose, i, &at) * v[i]).sum::<Vector3<f64>>().norm()
 }
 
+/// Distance of the striking point, at the impact, from where it belongs, m.
+pub(crate) fn ball_miss(solver: &Solver) -> f64 {
+    let plan = &*solver.plan;
+    let [x, ..] = solver.state(plan.lock[1].min(plan.nodes.len() - 1));
+    let mut pose = plan.tree.pose();
+    plan.tree.place(&x, &mut pose);
+    (pose.point(&plan.strike) - plan.strike_place).norm()
+}
+
 /// Approach angle (20), rad.
 pub(crate) fn approach_angle(solver: &Solver) -> f64 {
     let [x, ..] = solver.state(0);
@@ -163,28 +173,29 @@ pub(crate) fn approach_angle(solver: &Solver) -> f64 {
 /// Violations against the real limits: what the solver saw, less the margins it worked with.
 pub(crate) fn violations(solver: &Solver, worst: &Worst) -> BTreeMap<&'static str, f64> {
     let settings = solver.plan.settings;
-    Family::ALL
-        .into_iter()
-        .map(|family| {
-            let value = worst.values[family as usize];
-            let real = match family {
-                Family::Torque => (1.0 + value) * (1.0 - settings.torque_margin) - 1.0,
-                Family::JointSpeed => value - settings.speed_margin,
-                Family::JointLimit => value - settings.joint_margin,
-                Family::SelfCollision => value - settings.clearance,
-                Family::Ground => value - settings.ground_clearance,
-                Family::Friction => value - super::friction::SPARE,
-                Family::ApproachAngle => value - approach::SPARE,
-                _ => value,
-            };
-            (family.name(), if real.is_nan() { f64::INFINITY } else { real.max(0.0) })
-        })
-        .collect()
+    Family::ALL.into_iter().map(|f| (f.name(), real(settings, f, worst.values[f as usize]))).collect()
 }
 
-/// The first knots at which `family` is violated by more than `tolerance`, at most ten.
-pub(crate) fn violated(solver: &Solver, family: &str, tolerance: f64) -> Vec<usize> {
-    let _ = (family, tolerance);
-    let worst = solver.last_worst;
-    Family::ALL.into_iter().filter(|f| f.name() == family).map(|f| worst.nodes[f as usize]).collect()
+/// A violation against the real limit.
+fn real(settings: &KinodynamicSettings, family: Family, value: f64) -> f64 {
+    let real = match family {
+        Family::Torque => (1.0 + value) * (1.0 - settings.torque_margin) - 1.0,
+        Family::JointSpeed => value - settings.speed_margin,
+        Family::JointLimit => value - settings.joint_margin,
+        Family::SelfCollision => value - settings.clearance,
+        Family::Ground => value - settings.ground_clearance,
+        Family::Friction => value - super::friction::SPARE,
+        Family::ApproachAngle => value - approach::SPARE,
+        _ => value,
+    };
+    if real.is_nan() { f64::INFINITY } else { real.max(0.0) }
+}
+
+/// The first knots of the reference at which `family` is violated, at most ten.
+pub(crate) fn violated(solver: &mut Solver, family: &str) -> Vec<usize> {
+    let Some(family) = Family::ALL.into_iter().find(|f| f.name() == family) else { return Vec::new() };
+    let settings = solver.plan.settings;
+    let values = solver.by_node(family);
+    let nodes = values.iter().enumerate().filter(|(_, value)| real(settings, family, **value) > settings.tolerance);
+    nodes.map(|(k, _)| 2 * k).take(10).collect()
 }

@@ -69,6 +69,8 @@ pub(crate) struct Plan<'a> {
     pub capsules: Capsules,
     /// The point of the kicking foot whose speed counts: the middle of its first striking geom.
     pub strike: LinkPoint,
+    /// Where that point should be at the impact, m: to the ball as the kinematic stage has it.
+    pub strike_place: Vector3<f64>,
     /// In the reference's own time.
     pub phases: KickPhases,
     /// First and last node at which the ankle keeps still; (19).
@@ -78,7 +80,7 @@ pub(crate) struct Plan<'a> {
     pub weight: f64,
     /// The clip's own time at node 0, s.
     pub clip_start: f64,
-    /// By how much the world was turned about the ball so that the approach angle can be kept, rad.
+    /// By how much the motion was turned about the ball, beyond the aim, so that the approach angle can be kept, rad.
     pub aim_turn: f64,
 }
 
@@ -104,6 +106,14 @@ impl<'a> Plan<'a> {
                 expected: "at least 8".into(),
             });
         }
+        let targets = start.targets.frames.iter().flat_map(|frame| &frame.positions);
+        let finite = start.positions.iter().flatten().chain(targets.flat_map(|at| at.iter())).all(|x| x.is_finite());
+        if !finite {
+            return Err(RetargetError::Breakdown {
+                iteration: start.iterations,
+                what: "a position that is not a number came out of it",
+            });
+        }
         let step = 1.0 / settings.rate;
         let of_clip = |t: f64| ((t - first / rate) * settings.time_scale).max(0.0);
         let phases = KickPhases {
@@ -118,10 +128,14 @@ impl<'a> Plan<'a> {
         let lock = [node_at(phases.t_lock), impact];
 
         let ball = Vector3::from(start.reference.ball);
-        let aim_turn = aim_turn(start, &ball, settings);
-        let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), aim_turn);
+        let shift = Vector3::new(settings.ball[0], settings.ball[1], 0.0);
+        let aim_turn = aim_turn(start, &(ball + shift), settings);
+        // The world's x axis is the aim; where that is not the clip's own direction, the clip is turned instead.
+        let angle = aim_turn - settings.aim;
+        let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), angle);
         let raw = stances(robot, &start.contacts);
         let mut near = 0.0;
+        let mut at_impact = Vec::new();
         let mut nodes = Vec::with_capacity(count);
         for k in 0..count {
             let frame = (first + k as f64 * stride).clamp(0.0, last);
@@ -138,9 +152,15 @@ impl<'a> Plan<'a> {
                 });
             }
             posture.iter_mut().zip(&next).for_each(|(x, y)| *x += share.max(0.0) * (y - *x));
-            turn_about(&mut posture, &ball, &turn, aim_turn);
+            let moved = |at: Vector3<f64>| ball + turn * (at - shift - ball);
+            if k == impact {
+                at_impact.clone_from(&posture);
+            }
+            let base = moved(Vector3::new(posture[0], posture[1], posture[2]));
+            posture[..3].copy_from_slice(base.as_slice());
+            posture[3] += angle;
             let (a, b) = (&start.targets.frames[below].positions, &start.targets.frames[above].positions);
-            let targets = a.iter().zip(b).map(|(a, b)| ball + turn * (a + (b - a) * share.max(0.0) - ball)).collect();
+            let targets = a.iter().zip(b).map(|(a, b)| moved(a + (b - a) * share.max(0.0))).collect();
             let nearest = frame.round() as usize;
             let standing = (0..robot.contacts.len())
                 .map(|p| raw.iter().any(|s| s.point == p && (s.start..s.end).contains(&nearest)))
@@ -159,6 +179,9 @@ impl<'a> Plan<'a> {
             let centre = (axis[0] + axis[1]) * 0.5 - data.link_position(link);
             LinkPoint { link, point: data.link_matrix(link).transpose() * centre }
         });
+        let mut pose = tree.pose();
+        tree.place(&at_impact, &mut pose);
+        let strike_place = pose.point(&strike);
         let weight = tree.mass * tree.gravity;
         let keypoints = keypoints(&start.targets, weights);
         let capsules = Capsules::new(robot, &data);
@@ -173,6 +196,7 @@ impl<'a> Plan<'a> {
             keypoints,
             capsules,
             strike,
+            strike_place,
             phases,
             lock,
             ball,
@@ -297,18 +321,11 @@ impl<'a> Plan<'a> {
     }
 }
 
-/// Turns coordinates about the ball's vertical axis.
-fn turn_about(x: &mut [f64], ball: &Vector3<f64>, turn: &Rotation3<f64>, angle: f64) {
-    let at = ball + turn * (Vector3::new(x[0], x[1], x[2]) - ball);
-    x[..3].copy_from_slice(at.as_slice());
-    x[3] += angle;
-}
-
 /// The least turn of the whole motion about the ball that brings the approach angle (20) at the start into its range.
 fn aim_turn(start: &Retargeted, ball: &Vector3<f64>, settings: &KinodynamicSettings) -> f64 {
     let Some(q) = start.positions.first() else { return 0.0 };
     let (x, y) = (ball.x - q[0], ball.y - q[1]);
-    let angle = y.atan2(x);
+    let angle = y.atan2(x) - settings.aim;
     let [least, greatest] = settings.approach_angle;
     let spare = (0.25 * (greatest - least)).min(0.01);
     let wanted = angle.abs().clamp(least + spare, (greatest - spare).max(least + spare));

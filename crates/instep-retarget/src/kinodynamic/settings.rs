@@ -22,6 +22,9 @@ pub struct KinodynamicWeights {
     pub q_f: f64,
     /// Q_i of (4), for the kicking foot's velocity along x (the kick), y and z, s^2/m^2. Larger kicks harder.
     pub q_i: [f64; 3],
+    /// Distance of the striking point, at the impact, from the place that it has to the ball in the kinematic stage,
+    /// 1/m^2. Larger meets the ball more exactly where it lies.
+    pub q_ball: f64,
     /// For the square of the foot's missing speed along x at the impact, s^2/m^2, where `foot_speed` is set.
     pub q_target: f64,
     /// Joint and base acceleration, s^4/rad^2; not in the paper. Larger is smoother.
@@ -42,6 +45,7 @@ impl Default for KinodynamicWeights {
             q_h: 1e-4,
             q_f: 1e-3,
             q_i: [0.04, 0.0, 0.0],
+            q_ball: 100.0,
             q_target: 1.0,
             q_a: 2e-8,
             q_j: 5e-9,
@@ -59,6 +63,12 @@ pub struct KinodynamicSettings {
     pub rate: f64,
     /// Factor on all times of the clip: 1.2 is a kick slowed down by a fifth. 0.5 to 4.
     pub time_scale: f64,
+    /// Where the ball lies, from the place where the clip's own kick meets it, m; x along the clip's kick, y to its
+    /// left. -0.5 to 0.5 each.
+    pub ball: [f64; 2],
+    /// Direction of the kick, from that of the clip's own to the left, rad; the way of the run-up stays, so that the
+    /// approach angle changes by as much, within its range. -1 to 1.
+    pub aim: f64,
     /// Weights of the costs.
     pub weights: KinodynamicWeights,
     /// A foot that leaves the ground for less than this goes on standing, s; 0 to 0.3. Short gaps come from the contact
@@ -96,6 +106,8 @@ impl Default for KinodynamicSettings {
         Self {
             rate: 180.0,
             time_scale: 1.0,
+            ball: [0.0; 2],
+            aim: 0.0,
             weights: KinodynamicWeights::default(),
             min_gap: 0.075,
             friction: 0.6,
@@ -114,13 +126,22 @@ impl Default for KinodynamicSettings {
 }
 
 impl KinodynamicSettings {
+    /// Most nodes a second.
+    pub(crate) const MAX_RATE: f64 = 240.0;
+
     /// Checks every field's range.
-    pub(crate) fn validate(&self) -> Result<(), RetargetError> {
+    ///
+    /// # Errors
+    /// When a field is out of its range; the error names it.
+    pub fn validate(&self) -> Result<(), RetargetError> {
         let [least, greatest] = self.approach_angle;
         let w = &self.weights;
         let fields = [
-            ("rate", self.rate, 30.0, 240.0),
+            ("rate", self.rate, 30.0, Self::MAX_RATE),
             ("time_scale", self.time_scale, 0.5, 4.0),
+            ("ball[0]", self.ball[0], -0.5, 0.5),
+            ("ball[1]", self.ball[1], -0.5, 0.5),
+            ("aim", self.aim, -1.0, 1.0),
             ("min_gap", self.min_gap, 0.0, 0.3),
             ("friction", self.friction, 0.1, 2.0),
             ("approach_angle[0]", least, 0.0, 1.5),
@@ -140,6 +161,7 @@ impl KinodynamicSettings {
             ("weights.q_i[0]", w.q_i[0], 0.0, 1e3),
             ("weights.q_i[1]", w.q_i[1], 0.0, 1e3),
             ("weights.q_i[2]", w.q_i[2], 0.0, 1e3),
+            ("weights.q_ball", w.q_ball, 0.0, 1e6),
             ("weights.q_target", w.q_target, 0.0, 1e6),
             ("weights.q_a", w.q_a, 0.0, 1.0),
             ("weights.q_j", w.q_j, 0.0, 1.0),

@@ -19,7 +19,7 @@ use super::node::{Scratch, rows};
 use super::plan::Plan;
 use super::terms::{FAMILIES, Family, Pass, Sink, Worst};
 use super::transcription::Unknowns;
-use super::{Progress, ankle_lock, limits, smoothness};
+use super::{Progress, Work, ankle_lock, limits, smoothness};
 use crate::banded::Banded;
 
 /// First penalty of each family, in the order of [`Family::ALL`].
@@ -125,12 +125,12 @@ pub(crate) struct Solver<'a, 'b> {
     damping: f64,
     pub iterations: usize,
     pub cost: f64,
-    pub last_worst: Worst,
+    pub round: usize,
 }
 
 impl<'a, 'b> Solver<'a, 'b> {
-    pub(crate) fn new(plan: &'a mut Plan<'b>) -> Self {
-        let x = Unknowns::guess(plan);
+    /// Starts at `x`.
+    pub(crate) fn new(plan: &'a mut Plan<'b>, x: Unknowns) -> Self {
         let nv = plan.tree.nv;
         let count = plan.nodes.len();
         let size = x.c.len();
@@ -148,7 +148,7 @@ impl<'a, 'b> Solver<'a, 'b> {
             damping: 1e-3,
             iterations: 0,
             cost: 0.0,
-            last_worst: Worst::default(),
+            round: 0,
             x,
             plan,
         }
@@ -201,8 +201,27 @@ impl<'a, 'b> Solver<'a, 'b> {
         }
         self.coefficient_rows(&x, update, Some(&mut worst));
         self.x = x;
-        self.last_worst = worst;
         worst
+    }
+
+    /// The violation of one family at each node.
+    pub(crate) fn by_node(&mut self, family: Family) -> Vec<f64> {
+        let mut values = vec![Worst::default(); self.plan.nodes.len()];
+        let mut state = Default::default();
+        for (k, worst) in values.iter_mut().enumerate() {
+            self.x.state(k, self.plan.tree.nv, &self.stencil, &mut state);
+            let mut sink = Sink::new(Pass::Report(worst), k, &self.rho, &mut self.node_multipliers[k]);
+            let [q, v, a] = &state;
+            rows(self.plan, k, [q, v, a, &self.x.f[k]], false, &mut self.scratch, &mut sink);
+        }
+        let mut all: Vec<f64> = values.iter().map(|worst| worst.values[family as usize]).collect();
+        let x = self.x.clone();
+        let mut worst = Worst::default();
+        self.coefficient_rows(&x, false, Some(&mut worst));
+        if let Some(value) = all.get_mut(worst.nodes[family as usize]) {
+            *value = value.max(worst.values[family as usize]);
+        }
+        all
     }
 
     /// Builds every node's matrix and gradient at the present unknowns.
@@ -350,6 +369,7 @@ impl<'a, 'b> Solver<'a, 'b> {
         let mut best: Option<(f64, Unknowns)> = None;
         let mut end = End::Rounds;
         'rounds: for round in 0..settings.rounds {
+            self.round = round;
             if round < SETTLING {
                 let positions = self.positions();
                 self.plan.settle(&positions);
@@ -370,6 +390,7 @@ impl<'a, 'b> Solver<'a, 'b> {
                 let worst = self.violations(false);
                 let (family, by) = worst.most();
                 progress(Progress {
+                    work: Work::Optimisation,
                     iteration: self.iterations,
                     iterations: settings.iterations,
                     round,
@@ -433,5 +454,70 @@ impl<'a, 'b> Solver<'a, 'b> {
         let mut state = Default::default();
         self.x.state(k, self.plan.tree.nv, &self.stencil, &mut state);
         state
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "tests stop at the first surprise")]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::kinematic::Weights;
+    use crate::kinodynamic::KinodynamicSettings;
+    use crate::kinodynamic::tests::{noise, started};
+
+    /// One family of rows on coefficients.
+    type Rows = fn(&Plan, &[f64], &mut CoefficientSink);
+
+    /// (16), (17), (19) and the jerk: their gradient is the difference of what they add.
+    #[test]
+    fn gradients_of_rows_on_coefficients_are_differences() {
+        let robots = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots");
+        let robot = instep_robot::Robot::load(&robots.join("prestoe")).unwrap();
+        let start = started(&robot);
+        let settings = KinodynamicSettings { rate: 60.0, ..KinodynamicSettings::default() };
+        let plan = Plan::new(&robot, &start, &Weights::default(), &settings).unwrap();
+        let nv = plan.tree.nv;
+        let mut c = Unknowns::guess(&plan).c;
+        // Far enough that limits of angle and speed are broken.
+        let wild = noise(3, c.len());
+        c.iter_mut().zip(&wild).for_each(|(c, w)| *c += 1.5 * w);
+        let rho = [2.0; FAMILIES];
+        let families: [(&str, Rows); 3] =
+            [("limits", limits::rows), ("ankle_lock", ankle_lock::rows), ("smoothness", smoothness::rows)];
+        for (name, rows) in families {
+            let sum = |c: &[f64], system: Option<(&mut Banded, &mut Vec<f64>)>| {
+                let mut multipliers = Vec::new();
+                let (worst, cursor, merit) = (None, 0, 0.0);
+                let mut sink = CoefficientSink {
+                    system,
+                    worst,
+                    update: false,
+                    rho: &rho,
+                    multipliers: &mut multipliers,
+                    cursor,
+                    merit,
+                };
+                rows(&plan, c, &mut sink);
+                sink.merit
+            };
+            let mut gradient = vec![0.0; c.len()];
+            sum(&c, Some((&mut Banded::zeros(c.len(), 3 * nv), &mut gradient)));
+            let mut moved = 0;
+            for i in (0..c.len()).step_by(7) {
+                let e = 1e-6;
+                let mut sides = [e, -e].map(|step| {
+                    let mut moved = c.clone();
+                    moved[i] += step;
+                    sum(&moved, None)
+                });
+                sides.iter_mut().for_each(|side| *side /= 2.0 * e);
+                let (difference, own) = (sides[0] - sides[1], gradient[i]);
+                assert!((difference - own).abs() < 1e-3 * (1.0 + own.abs()), "{name} {i}: {difference} {own}");
+                moved += usize::from(difference != 0.0);
+            }
+            assert!(moved > 0, "{name}: no row was tried");
+        }
     }
 }

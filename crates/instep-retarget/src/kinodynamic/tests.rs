@@ -304,6 +304,58 @@ fn standing_still_is_carried_by_the_weight() {
     assert_eq!(done, solve(robot, &start, false), "the same again");
 }
 
+/// What is not a number is refused at the door.
+#[test]
+fn nothing_that_is_not_a_number_comes_in() {
+    let robot = &robots()[0];
+    let settings = super::KinodynamicSettings { rate: 60.0, ..Default::default() };
+    let go = |start: &crate::kinematic::Retargeted| {
+        let stop = std::sync::atomic::AtomicBool::new(false);
+        super::optimize(robot, start, &crate::kinematic::Weights::default(), &settings, &stop, &mut |_| {})
+    };
+    let mut start = standing(robot);
+    start.positions[7][9] = f64::NAN;
+    assert!(matches!(go(&start), Err(crate::RetargetError::Breakdown { .. })));
+    let mut start = standing(robot);
+    start.targets.frames[5].positions[2].y = f64::INFINITY;
+    assert!(matches!(go(&start), Err(crate::RetargetError::Breakdown { .. })));
+}
+
+/// A target so far away that its square is no number any more: the solver ends, and what it gives back is finite.
+#[test]
+fn an_overflow_stays_inside() {
+    let robot = &robots()[0];
+    let mut start = standing(robot);
+    start.targets.frames[9].positions[0].x = 1e200;
+    let done = solve(robot, &start, false);
+    assert!(!done.status.feasible() || done.cost.is_finite());
+    done.reference.validate().unwrap();
+    assert!(done.violations.values().all(|v| !v.is_nan()));
+}
+
+/// Where the ball lies and where it shall go turn and move the motion, not the ball.
+#[test]
+fn ball_and_aim_move_the_run_up() {
+    use super::plan::Plan;
+    let robot = &robots()[0];
+    let start = standing(robot);
+    let weights = crate::kinematic::Weights::default();
+    let of = |ball: [f64; 2], aim: f64| {
+        // Wide enough that the approach angle turns nothing back.
+        let settings = super::KinodynamicSettings { ball, aim, approach_angle: [0.0, 1.5], ..Default::default() };
+        let plan = Plan::new(robot, &start, &weights, &settings).unwrap();
+        (plan.nodes[0].posture.clone(), plan.strike_place, plan.ball)
+    };
+    let (plain, strike, ball) = of([0.0; 2], 0.0);
+    let (moved, moved_strike, moved_ball) = of([0.1, -0.05], 0.0);
+    assert!((moved[0] - plain[0] + 0.1).abs() < 1e-9 && (moved[1] - plain[1] - 0.05).abs() < 1e-9);
+    assert_eq!((strike, ball), (moved_strike, moved_ball));
+    let (turned, turned_strike, _) = of([0.0; 2], 0.2);
+    assert!((turned[3] - plain[3] + 0.2).abs() < 1e-9, "a kick to the left is run up to from farther right of it");
+    assert!((turned[0].hypot(turned[1]) - plain[0].hypot(plain[1])).abs() < 1e-9);
+    assert_eq!(strike, turned_strike);
+}
+
 #[test]
 fn a_stop_keeps_what_there_is() {
     let robot = &robots()[0];

@@ -40,6 +40,49 @@ impl Unknowns {
         Self { c, f }
     }
 
+    /// The same motion and forces with the nodes of another plan of the same clip: `old` are these unknowns' plan.
+    pub(crate) fn resampled(&self, old: &Plan, plan: &Plan) -> Self {
+        let nv = plan.tree.nv;
+        let scale = plan.settings.time_scale;
+        // In steps of the old plan.
+        let at = |k: usize| {
+            let t = k as f64 * plan.step + (plan.clip_start - old.clip_start) * scale;
+            (t / old.step).clamp(0.0, (old.nodes.len() - 1) as f64)
+        };
+        let mut x = Self::guess(plan);
+        for i in 0..nv {
+            let values: Vec<f64> = (0..plan.nodes.len()).map(|k| self.position(at(k), i, nv)).collect();
+            for (b, value) in through(&values).into_iter().enumerate() {
+                x.c[b * nv + i] = value;
+            }
+        }
+        for (k, (node, forces)) in plan.nodes.iter().zip(&mut x.f).enumerate() {
+            let near = at(k).round() as usize;
+            for (&point, force) in node.pushing.iter().zip(forces.chunks_mut(3)) {
+                let place = old.nodes[near].pushing.iter().position(|&p| p == point);
+                match place {
+                    Some(place) => force.copy_from_slice(&self.f[near][3 * place..3 * place + 3]),
+                    None => force.copy_from_slice(&[0.0, 0.0, 1e-2]),
+                }
+            }
+        }
+        x
+    }
+
+    /// Coordinate `i` of the spline at `u` steps from the first node.
+    fn position(&self, u: f64, i: usize, nv: usize) -> f64 {
+        let last = self.c.len() / nv - 3;
+        let k = (u.floor() as usize).min(last.saturating_sub(1));
+        let s = u - k as f64;
+        let weights = [
+            (1.0 - s).powi(3),
+            3.0 * s.powi(3) - 6.0 * s * s + 4.0,
+            -3.0 * s.powi(3) + 3.0 * s * s + 3.0 * s + 1.0,
+            s.powi(3),
+        ];
+        weights.iter().enumerate().map(|(b, w)| w / 6.0 * self.c[(k + b) * nv + i]).sum()
+    }
+
     /// Position, speed and acceleration at a node.
     pub(crate) fn state(&self, k: usize, nv: usize, stencil: &Stencil, out: &mut [Vec<f64>; 3]) {
         for (values, weights) in out.iter_mut().zip([stencil.q, stencil.v, stencil.a]) {
@@ -87,6 +130,19 @@ fn through(values: &[f64]) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn between_the_nodes_the_spline_is_cubic() {
+        let values: Vec<f64> = (0..9).map(|i| (f64::from(i) * 0.3).sin()).collect();
+        let x = Unknowns { c: through(&values), f: Vec::new() };
+        for (k, value) in values.iter().enumerate() {
+            assert!((x.position(k as f64, 0, 1) - value).abs() < 1e-12, "node {k}");
+        }
+        // Away from the ends, where the spline has no acceleration and the sine has.
+        for u in [3.5, 4.25, 5.0 - 1e-9] {
+            assert!((x.position(u, 0, 1) - (u * 0.3).sin()).abs() < 1e-3, "at {u}");
+        }
+    }
 
     #[test]
     fn the_spline_goes_through_its_values() {

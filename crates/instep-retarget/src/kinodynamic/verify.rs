@@ -15,6 +15,14 @@ use serde::Serialize;
 
 /// Half the time over which speeds are differenced, s.
 pub const DIFFERENCE: f64 = 1e-5;
+/// Instants a second at which [`super::optimize`] checks, at least.
+pub const VERIFY_RATE: f64 = 200.0;
+/// Largest wrench on the base that a motion may leave over, as a share of m g.
+pub const MAX_ROOT_WRENCH: f64 = 0.01;
+/// Longest way of a standing point, m.
+pub const MAX_SLIP: f64 = 1e-3;
+/// Deepest point below the ground and deepest overlap of capsules, m; largest force outside its cone, share of m g.
+pub const MAX_DEPTH: f64 = 1e-4;
 /// What rounding in the reference may add to a limit, as a share of it.
 const ROUNDING: f64 = 1e-6;
 
@@ -45,6 +53,35 @@ pub struct Verification {
     pub torque_use: BTreeMap<String, f64>,
     /// Largest speed of each joint as a share of its limit.
     pub speed_use: BTreeMap<String, f64>,
+    /// The same two from the start of the swing to the impact only.
+    pub swing_torque_use: BTreeMap<String, f64>,
+    /// See `swing_torque_use`.
+    pub swing_speed_use: BTreeMap<String, f64>,
+}
+
+impl Verification {
+    /// What is beyond its bound, if anything: its field and by how much (violations of limits: the largest share).
+    #[must_use]
+    pub fn fault(&self) -> Option<(&'static str, f64)> {
+        let most = |uses: &BTreeMap<String, f64>| uses.values().fold(0.0_f64, |most, share| most.max(*share)) - 1.0;
+        let counted = [
+            ("torque_violations", self.torque_violations, most(&self.torque_use)),
+            ("speed_violations", self.speed_violations, most(&self.speed_use)),
+            ("joint_violations", self.joint_violations, self.joint_violations as f64),
+        ];
+        let measured = [
+            ("root_wrench_residual", self.root_wrench_residual, MAX_ROOT_WRENCH),
+            ("stance_slip", self.stance_slip, MAX_SLIP),
+            ("penetration", self.penetration, MAX_DEPTH),
+            ("self_collision", self.self_collision, MAX_DEPTH),
+            ("friction", self.friction, MAX_DEPTH),
+        ];
+        let counted = counted.into_iter().filter(|(_, count, _)| *count > 0).map(|(name, _, by)| (name, by));
+        // Written so that a NaN is a fault.
+        let measured =
+            measured.into_iter().filter(|(_, value, most)| !(value <= most)).map(|(name, value, _)| (name, value));
+        counted.chain(measured).next()
+    }
 }
 
 /// Checks `reference` at `rate` instants a second, at least; `friction` is the coefficient of the cone.
@@ -90,6 +127,10 @@ pub fn verify(robot: &Robot, reference: &Reference, rate: f64, friction: f64) ->
             let bound = if torque < 0.0 { -least } else { greatest }.max(1e-9);
             note(&mut found.torque_use, &joint.name, torque.abs() / bound);
             note(&mut found.speed_use, &joint.name, speed.abs() / joint.speed);
+            if (reference.phases.t_swing..=reference.phases.t_impact).contains(&t) {
+                note(&mut found.swing_torque_use, &joint.name, torque.abs() / bound);
+                note(&mut found.swing_speed_use, &joint.name, speed.abs() / joint.speed);
+            }
         }
         // A point stands between two knots when it does at both.
         let next = (t * reference.rate).ceil() as usize;
