@@ -35,6 +35,11 @@ impl Failure {
         Self { message: format!("{what}: {}", self.message), ..self }
     }
 
+    /// The same with the stage of a long work at the end.
+    pub(crate) fn in_stage(self, stage: &str) -> Self {
+        Self { message: format!("{} (stage: {stage})", self.message), ..self }
+    }
+
     /// What the user reads.
     pub(crate) fn message(&self) -> &str {
         &self.message

@@ -1,7 +1,8 @@
 //! Instep's command line: reads what the user asked for, runs it, and ends with a code that tells how it went.
 //!
 //! Exit codes: 0, the command did what was asked (a kick that falls or fails its audit is a result, not an error);
-//! 1, it could not; 2, something handed in cannot be used: one message on standard error says what and what would be
+//! 1, it could not (no motion that the robot can do was found; the best is written and marked so); 130, Ctrl-C stopped
+//! it and the best so far is written; 2, something handed in cannot be used: one message on standard error says what and what would be
 //! right, and nothing was written.
 
 mod bench;

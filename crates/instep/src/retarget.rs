@@ -1,27 +1,37 @@
-//! `instep retarget`: a human kick becomes a reference for a robot.
+//! `instep retarget`: a human kick becomes a reference for a robot, in the four stages of paper 1: rescaling, kinematic
+//! stage, kinodynamic stage, verification.
 
+mod effort;
+mod measures;
 mod page;
+mod progress;
+mod summary;
 
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::time::Instant;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use clap::{Args, ValueEnum};
-use indicatif::{ProgressBar, ProgressStyle};
 use instep_motion::asf;
 use instep_motion::clip::{self, Clip, LoadOptions};
-use instep_motion::phase::Side;
-use instep_motion::reference::{ReferenceKind, Source};
+use instep_motion::reference::{Reference, Source};
 use instep_retarget::RetargetError;
-use instep_retarget::kinematic::{self, ContactForm, KinematicSettings, Retargeted, Status};
+use instep_retarget::kinematic::{self, ContactForm, KinematicSettings, Retargeted};
+use instep_retarget::kinodynamic::{self, Kinodynamic, KinodynamicSettings, Status};
 use instep_robot::Robot;
-use serde::Serialize;
+use serde::Deserialize;
 
 use crate::failure::Failure;
-use crate::output::{Output, Paint};
+use crate::kick::{degrees, point};
+use crate::output::Output;
 use crate::{files, places};
+use measures::Measures;
+use progress::Line;
+
+/// The code of a program that Ctrl-C ended.
+const INTERRUPTED: u8 = 130;
 
 /// The arguments of `instep retarget`.
 #[derive(Debug, Args)]
@@ -36,14 +46,30 @@ pub(crate) struct Retarget {
     #[arg(long, value_name = "ROBOT", default_value = "prestoe")]
     robot: String,
     /// How far to go
-    #[arg(long, value_enum, default_value_t = Stage::Kinematic)]
+    #[arg(long, value_enum, default_value_t = Stage::Kinodynamic)]
     stage: Stage,
-    /// Whether standing feet stand still
+    /// Whether standing feet stand still; slip goes with --stage kinematic
     #[arg(long, value_enum, default_value_t = Form::Enforced)]
     form: Form,
-    /// Knots a second of the reference
-    #[arg(long, value_name = "HZ", default_value_t = 30.0, allow_negative_numbers = true)]
-    rate: f64,
+    /// Knots a second of the reference [default: 30 after the kinematic stage, 360 after the kinodynamic one, which has
+    /// a node of the optimisation at every other knot]
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
+    rate: Option<f64>,
+    /// Factor on all times of the clip: 1.2 is a kick slowed down by a fifth [default: 1]
+    #[arg(long, value_name = "FACTOR", allow_negative_numbers = true)]
+    time_scale: Option<f64>,
+    /// Where the ball lies, in metres from where the clip's own kick meets it: x along that kick, y to its left
+    #[arg(long, value_name = "X,Y", allow_hyphen_values = true, value_parser = point)]
+    ball: Option<[f64; 2]>,
+    /// Direction of the kick, in degrees to the left of the clip's own
+    #[arg(long, value_name = "ANGLE", allow_hyphen_values = true, value_parser = degrees)]
+    aim: Option<f64>,
+    /// Speed along the kick that the foot should have at the impact, in m/s [default: as fast as it can be]
+    #[arg(long, value_name = "SPEED", allow_negative_numbers = true)]
+    foot_speed: Option<f64>,
+    /// Settings of both stages, as TOML with the tables [kinematic] and [kinodynamic]; what is absent keeps its default
+    #[arg(long, value_name = "FILE.toml")]
+    settings: Option<PathBuf>,
     /// Frames a second of an AMC clip, which does not say
     #[arg(long, value_name = "HZ", default_value_t = asf::CMU_RATE, allow_negative_numbers = true)]
     clip_rate: f64,
@@ -66,6 +92,8 @@ pub(crate) struct Retarget {
 enum Stage {
     /// Inverse kinematics over the whole clip; no forces
     Kinematic,
+    /// And the nearest motion that the robot's dynamics, motors and contacts allow, verified
+    Kinodynamic,
 }
 
 /// What becomes of standing feet.
@@ -77,6 +105,14 @@ enum Form {
     Enforced,
 }
 
+/// The settings' file.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct Settings {
+    kinematic: KinematicSettings,
+    kinodynamic: KinodynamicSettings,
+}
+
 /// A clip, retargeted.
 struct Done {
     robot: Robot,
@@ -84,8 +120,12 @@ struct Done {
     clip_file: PathBuf,
     form: Form,
     retargeted: Retargeted,
-    /// Time that the stage took, s.
-    seconds: f64,
+    /// Where the command went that far.
+    kinodynamic: Option<Kinodynamic>,
+    /// Of the cone.
+    friction: f64,
+    /// Time that each stage took, s.
+    seconds: BTreeMap<&'static str, f64>,
     reference: PathBuf,
     report: PathBuf,
 }
@@ -96,31 +136,37 @@ impl Retarget {
     /// # Errors
     /// When something handed in cannot be used, or the solver breaks down. A bar that is missed is no error.
     pub(crate) fn run(self, output: &Output) -> Result<ExitCode, Failure> {
-        let Stage::Kinematic = self.stage;
+        let mut line = Line::new();
         let clip = self.load()?;
         let robot = places::robot(&self.robot)?;
         let (reference, report) = self.outputs();
         for file in [&reference, &report] {
             files::check_file(file)?;
         }
-        let form = match self.form {
-            Form::Slip => ContactForm::Slip,
-            Form::Enforced => ContactForm::Enforced,
+        let Settings { kinematic: settings, kinodynamic: limits } = self.settings()?;
+        if self.stage == Stage::Kinodynamic {
+            limits.validate().map_err(|error| self.explain(error, &mut line))?;
+        }
+        line.at("rescaling");
+        let retargeted = kinematic::retarget(&robot, &clip, self.source(), &settings, &mut |at| line.kinematic(&at));
+        let retargeted = retargeted.map_err(|error| self.explain(error, &mut line))?;
+        let kinodynamic = match self.stage {
+            Stage::Kinematic => None,
+            Stage::Kinodynamic => {
+                let stop = stopped_by_the_user();
+                line.at("kinodynamic");
+                let weights = &settings.weights;
+                let tell = &mut |at| line.kinodynamic(&at);
+                let done = kinodynamic::optimize(&robot, &retargeted, weights, &limits, &stop, tell);
+                Some(done.map_err(|error| self.explain(error, &mut line))?)
+            }
         };
-        let settings = KinematicSettings { form, rate: self.rate, ..KinematicSettings::default() };
-        let bar = progress(settings.iterations);
-        let begin = Instant::now();
-        let retargeted = kinematic::retarget(&robot, &clip, self.source(), &settings, &mut |at| {
-            bar.set_position(at.iteration as u64);
-            bar.set_message(format!("cost {:.4e}", at.cost));
-        });
-        let seconds = begin.elapsed().as_secs_f64();
-        bar.finish_and_clear();
-        let retargeted = retargeted.map_err(|error| self.explain(error))?;
-        let done = Done { robot, clip, clip_file: self.clip, form: self.form, retargeted, seconds, reference, report };
+        let seconds = line.finish();
+        let (clip_file, form, friction) = (self.clip, self.form, limits.friction);
+        let done = Done { robot, clip, clip_file, form, retargeted, kinodynamic, friction, seconds, reference, report };
         done.write()?;
         output.show(&Measures::new(&done), |paint| done.text(paint))?;
-        Ok(ExitCode::SUCCESS)
+        Ok(done.code())
     }
 
     fn load(&self) -> Result<Clip, Failure> {
@@ -140,6 +186,61 @@ impl Retarget {
         Ok(clip::load(&self.clip, &options)?)
     }
 
+    /// The settings' file, and over it what the command line says.
+    fn settings(&self) -> Result<Settings, Failure> {
+        let mut settings: Settings = match &self.settings {
+            None => Settings::default(),
+            Some(path) => {
+                places::existing_file("--settings", path, "settings of retargeting (TOML)")?;
+                let text = std::fs::read_to_string(path)
+                    .map_err(|e| Failure::input(format!("{}: cannot be read: {e}; expected TOML", path.display())))?;
+                toml::from_str(&text)
+                    .map_err(|e| Failure::input(format!("{}: {}", path.display(), e.to_string().trim_end())))?
+            }
+        };
+        let goes_on = self.stage == Stage::Kinodynamic;
+        if goes_on && self.form == Form::Slip {
+            return Err(Failure::input(
+                "--form slip: the kinodynamic stage needs feet that stand still; expected --stage kinematic beside it",
+            ));
+        }
+        if !goes_on {
+            let given = [
+                ("--time-scale", self.time_scale.is_some()),
+                ("--ball", self.ball.is_some()),
+                ("--aim", self.aim.is_some()),
+                ("--foot-speed", self.foot_speed.is_some()),
+            ];
+            if let Some((option, _)) = given.into_iter().find(|(_, given)| *given) {
+                return Err(Failure::input(format!(
+                    "{option}: the kinematic stage has no such setting; expected --stage kinodynamic"
+                )));
+            }
+        }
+        settings.kinematic.form = match self.form {
+            Form::Slip => ContactForm::Slip,
+            Form::Enforced => ContactForm::Enforced,
+        };
+        match self.rate {
+            Some(rate) if goes_on => {
+                if !(60.0..=480.0).contains(&rate) {
+                    return Err(Failure::input(format!(
+                        "--rate: {rate}; expected 60 to 480 knots a second of a kinodynamic reference"
+                    )));
+                }
+                settings.kinodynamic.rate = rate / 2.0;
+            }
+            Some(rate) => settings.kinematic.rate = rate,
+            None => {}
+        }
+        let kinodynamic = &mut settings.kinodynamic;
+        kinodynamic.time_scale = self.time_scale.unwrap_or(kinodynamic.time_scale);
+        kinodynamic.ball = self.ball.unwrap_or(kinodynamic.ball);
+        kinodynamic.aim = self.aim.unwrap_or(kinodynamic.aim);
+        kinodynamic.foot_speed = self.foot_speed.or(kinodynamic.foot_speed);
+        Ok(settings)
+    }
+
     fn source(&self) -> Source {
         let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         Source {
@@ -154,9 +255,10 @@ impl Retarget {
     fn outputs(&self) -> (PathBuf, PathBuf) {
         let reference = self.out.clone().unwrap_or_else(|| {
             let stem = self.clip.file_stem().unwrap_or_default().to_string_lossy();
-            let kind = match self.form {
-                Form::Slip => "kinematic_slip",
-                Form::Enforced => "kinematic",
+            let kind = match (self.stage, self.form) {
+                (_, Form::Slip) => "kinematic_slip",
+                (Stage::Kinematic, Form::Enforced) => "kinematic",
+                (Stage::Kinodynamic, Form::Enforced) => "kinodynamic",
             };
             Path::new("out/retarget").join(format!("{stem}_{kind}.json"))
         });
@@ -164,170 +266,78 @@ impl Retarget {
         (reference, report)
     }
 
-    /// The stage's errors name no file; here it is known which one they are about.
-    fn explain(&self, error: RetargetError) -> Failure {
+    /// The stages' errors name no file and no stage; here both are known.
+    fn explain(&self, error: RetargetError, line: &mut Line) -> Failure {
+        let stage = line.stage();
+        line.clear();
         let about = match &error {
             RetargetError::Motion(_) => Some(self.clip.display().to_string()),
             RetargetError::Landmark { .. } => Some(self.robot.clone()),
-            _ => None,
+            RetargetError::Setting { .. } => self.settings.as_ref().map(|path| path.display().to_string()),
+            RetargetError::Breakdown { .. } => None,
         };
         let failure = Failure::from(error);
-        match about {
+        let failure = match about {
             Some(about) => failure.about(about),
             None => failure,
-        }
+        };
+        failure.in_stage(stage)
     }
 }
 
-/// A line on standard error, where it is a terminal.
-fn progress(iterations: usize) -> ProgressBar {
-    let bar = ProgressBar::new(iterations as u64);
-    if let Ok(style) = ProgressStyle::with_template("retargeting {bar:24} iteration {pos} of at most {len}, {msg}") {
-        bar.set_style(style);
-    }
-    bar
+/// A flag that Ctrl-C raises; a second Ctrl-C ends the program at once.
+fn stopped_by_the_user() -> Arc<AtomicBool> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let raised = Arc::clone(&stop);
+    // Without a handler Ctrl-C ends the program, as it would anyway.
+    let _ = ctrlc::set_handler(move || {
+        if raised.swap(true, std::sync::atomic::Ordering::Relaxed) {
+            std::process::exit(i32::from(INTERRUPTED));
+        }
+    });
+    stop
 }
 
 impl Done {
     /// Writes reference and report, both or neither.
     fn write(&self) -> Result<(), Failure> {
         let mut batch = files::Batch::default();
-        self.retargeted.reference.save(&batch.stage(&self.reference)?)?;
+        self.result().save(&batch.stage(&self.reference)?)?;
         page::page(self).save(batch.stage(&self.report)?)?;
         batch.commit()
     }
 
-    /// The text on the terminal.
-    fn text(&self, paint: Paint) -> String {
-        let mut out = String::new();
-        // Writing into a string cannot fail.
-        let _ = self.write_text(&mut out, paint);
-        out
+    /// The reference of the last stage.
+    fn result(&self) -> &Reference {
+        self.kinodynamic.as_ref().map_or(&self.retargeted.reference, |done| &done.reference)
     }
 
-    fn write_text(&self, out: &mut String, paint: Paint) -> std::fmt::Result {
-        let r = &self.retargeted;
-        let row = |label: &str, value: String| format!("  {} {value}\n", paint.faint(&format!("{label:<15}")));
-        let clip = self.clip_file.file_name().unwrap_or_default().to_string_lossy();
-        writeln!(out, "{}", paint.strong(&format!("{clip} on {}", self.robot.title)))?;
-        writeln!(out, "{}\n", paint.faint(self.form()))?;
-        out.push_str(&row(
-            "clip",
-            format!("{} frames at {:.0} Hz, {:.2} s", self.clip.frames.len(), self.clip.rate, self.clip.duration()),
-        ));
-        let p = &r.phases;
-        let phases = format!(
-            "planted {:.3} s, swing {:.3} s, lock {:.3} s, impact {:.3} s",
-            p.t_plant, p.t_swing, p.t_lock, p.t_impact
-        );
-        out.push_str(&row("kick", format!("{} foot; {phases} (clip's time)", p.kick_foot)));
-        let knots =
-            format!("{} knots at {} Hz, {:.2} s", r.reference.knots.len(), r.reference.rate, r.reference.duration());
-        out.push_str(&row("reference", knots));
-        let (status, solved) = match r.status {
-            Status::Solved => ("solved", true),
-            Status::OutOfIterations => ("out of iterations: the best found is written", false),
-        };
-        let status = if solved { paint.good(status) } else { paint.warn(status) };
-        out.push_str(&row(
-            "status",
-            format!(
-                "{status}, {} iterations, {:.2} s, {:.0} frames/s",
-                r.iterations,
-                self.seconds,
-                self.frames_per_second()
-            ),
-        ));
-        out.push_str(&row("stance slip", format!("{:.1} mm at most", r.max_stance_slip * 1e3)));
-        out.push_str(&row("keypoint error", format!("{:.1} mm on average", r.keypoint_error_mean() * 1e3)));
-        writeln!(out, "\n  {}", paint.faint("mean distance from the scaled human, mm"))?;
-        for line in r.keypoint_errors.chunks(4) {
-            let cells = line.iter().map(|(name, error)| format!("{:<15}{:>6.1}", name.replace('_', " "), error * 1e3));
-            writeln!(out, "  {}", cells.collect::<Vec<_>>().join("    "))?;
-        }
-        writeln!(out, "\n  {}", paint.faint("worst violation by family"))?;
-        for (family, worst) in &r.violations {
-            let text = format!("{:<18}{}", family.replace('_', " "), violation(family, *worst));
-            writeln!(out, "  {}", if *worst > 0.0 { paint.warn(&text) } else { paint.good(&text) })?;
-        }
-        writeln!(out, "\nwrote {} and {}", self.reference.display(), self.report.display())
-    }
-
-    fn form(&self) -> &'static str {
-        match self.form {
-            Form::Slip => "kinematic stage, the clip's foot slip kept",
-            Form::Enforced => "kinematic stage, standing feet stand still",
+    /// 0: the robot can do the motion, or nobody asked; 130: stopped by Ctrl-C; 1: the best that was found is not
+    /// feasible.
+    fn code(&self) -> ExitCode {
+        match self.kinodynamic.as_ref().map(|done| &done.status) {
+            None => ExitCode::SUCCESS,
+            Some(status) if status.feasible() => ExitCode::SUCCESS,
+            Some(Status::Stopped) => ExitCode::from(INTERRUPTED),
+            Some(_) => ExitCode::FAILURE,
         }
     }
 
+    fn stage(&self) -> &'static str {
+        match (&self.kinodynamic, self.form) {
+            (Some(_), _) => "all stages, verified by full inverse dynamics",
+            (None, Form::Slip) => "kinematic stage, the clip's foot slip kept",
+            (None, Form::Enforced) => "kinematic stage, standing feet stand still",
+        }
+    }
+
+    /// Frames of the clip a second of the kinematic stage.
     fn frames_per_second(&self) -> f64 {
-        self.clip.frames.len() as f64 / self.seconds
+        self.clip.frames.len() as f64 / self.kinematic_seconds()
     }
-}
 
-/// A family's worst violation with its unit.
-fn violation(family: &str, worst: f64) -> String {
-    match family {
-        _ if worst <= 0.0 => "none".to_owned(),
-        "joint_limit" => format!("{worst:.4} rad beyond the range"),
-        "joint_speed" => format!("{:.0} % beyond the limit", worst * 100.0),
-        _ => format!("{:.2} mm", worst * 1e3),
-    }
-}
-
-/// What `--json` prints. Keys are stable: they may be added to, never renamed. SI units.
-#[derive(Debug, Serialize)]
-struct Measures<'a> {
-    /// Frames of the clip.
-    frames: usize,
-    kick_foot: Side,
-    t_plant: f64,
-    t_swing: f64,
-    t_lock: f64,
-    /// These times are the clip's own.
-    t_impact: f64,
-    /// Time that the stage took.
-    seconds: f64,
-    frames_per_second: f64,
-    max_stance_slip: f64,
-    keypoint_error_mean: f64,
-    status: Status,
-    /// Worst by family: joint_limit (rad), joint_speed (share of the limit beyond it), the others metres.
-    violations: &'a BTreeMap<&'static str, f64>,
-    keypoint_errors: BTreeMap<&'a str, f64>,
-    iterations: usize,
-    robot: &'a str,
-    kind: ReferenceKind,
-    knots: usize,
-    rate: f64,
-    reference: &'a Path,
-    report: &'a Path,
-}
-
-impl<'a> Measures<'a> {
-    fn new(done: &'a Done) -> Self {
-        let r = &done.retargeted;
-        Self {
-            frames: done.clip.frames.len(),
-            kick_foot: r.phases.kick_foot,
-            t_plant: r.phases.t_plant,
-            t_swing: r.phases.t_swing,
-            t_lock: r.phases.t_lock,
-            t_impact: r.phases.t_impact,
-            seconds: done.seconds,
-            frames_per_second: done.frames_per_second(),
-            max_stance_slip: r.max_stance_slip,
-            keypoint_error_mean: r.keypoint_error_mean(),
-            status: r.status,
-            violations: &r.violations,
-            keypoint_errors: r.keypoint_errors.iter().map(|(name, error)| (name.as_str(), *error)).collect(),
-            iterations: r.iterations,
-            robot: &done.robot.name,
-            kind: r.reference.kind,
-            knots: r.reference.knots.len(),
-            rate: r.reference.rate,
-            reference: &done.reference,
-            report: &done.report,
-        }
+    /// Rescaling and kinematic stage, s.
+    fn kinematic_seconds(&self) -> f64 {
+        ["rescaling", "kinematic"].iter().filter_map(|stage| self.seconds.get(stage)).sum()
     }
 }

@@ -9,23 +9,32 @@ use instep_retarget::kinematic::Status;
 use instep_robot::{Robot, RobotData};
 use nalgebra::Vector3;
 
-use super::{Done, violation};
+use super::summary::kinematic_violation as violation;
+use super::{Done, effort};
 use crate::figure::{self, Figure};
 
 /// Stance slip that is still good, m (the project's bar for the enforced form).
 const GOOD_SLIP: f64 = 0.005;
 /// How far to the left of the robot the human stands, m.
-const APART: f32 = 1.2;
+pub(super) const APART: f32 = 1.2;
 
-/// The whole page.
+/// The page of the last stage.
 pub(super) fn page(done: &Done) -> Report {
+    match &done.kinodynamic {
+        Some(k) => effort::page(done, k),
+        None => kinematic(done),
+    }
+}
+
+/// The kinematic stage's page.
+fn kinematic(done: &Done) -> Report {
     let r = &done.retargeted;
     let clip = done.clip_file.file_name().unwrap_or_default().to_string_lossy();
     let mut data = done.robot.data();
     let times: Vec<f64> = (0..r.positions.len()).map(|frame| done.clip.time(frame)).collect();
     Report {
         title: format!("{clip} on {}", done.robot.name),
-        subtitle: format!("{} \u{b7} {}", done.form(), done.robot.title),
+        subtitle: format!("{} \u{b7} {}", done.stage(), done.robot.title),
         summary: items(done),
         tables: tables(done, &mut data),
         plots: plots(done, &mut data, &times),

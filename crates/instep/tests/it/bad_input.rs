@@ -35,8 +35,9 @@ fn refused(folder: &Path, arguments: &[&str], words: &[&str]) {
     }
 }
 
-const AMC: [&str; 5] = ["retarget", "--skeleton", "kick.asf", "--clip", "kick_01.amc"];
-const BVH: [&str; 5] = ["retarget", "--clip", "kick.bvh", "--unit", "1"];
+const AMC: [&str; 7] = ["retarget", "--stage", "kinematic", "--skeleton", "kick.asf", "--clip", "kick_01.amc"];
+const BVH: [&str; 7] = ["retarget", "--stage", "kinematic", "--clip", "kick.bvh", "--unit", "1"];
+const WHOLE: [&str; 5] = ["retarget", "--skeleton", "kick.asf", "--clip", "kick_01.amc"];
 const KICK: [&str; 3] = ["kick", "--reference", "swing.json"];
 
 #[test]
@@ -179,4 +180,48 @@ fn options_that_do_not_go_together() {
     refused(folder, &[&KICK[..], &["--start", "9"]].concat(), &["swing.json", "9", "0.5"]);
     refused(folder, &[&KICK[..], &["--duration", "-1"]].concat(), &["--duration", "-1", "above 0"]);
     refused(folder, &["kick", "--nonsense"], &["--nonsense"]);
+    refused(folder, &[&WHOLE[..], &["--form", "slip"]].concat(), &["--form", "slip", "--stage kinematic"]);
+    refused(folder, &[&AMC[..], &["--time-scale", "1.2"]].concat(), &["--time-scale", "--stage kinodynamic"]);
+    refused(folder, &[&AMC[..], &["--ball", "0.1,0"]].concat(), &["--ball", "--stage kinodynamic"]);
+}
+
+#[test]
+fn settings_of_retargeting_that_cannot_be() {
+    let folder = workspace();
+    let folder = folder.path();
+    let write = |text: &str| std::fs::write(folder.join("settings.toml"), text).unwrap();
+    let arguments = [&WHOLE[..], &["--settings", "settings.toml"]].concat();
+    refused(folder, &[&WHOLE[..], &["--settings", "none.toml"]].concat(), &["none.toml", "no such file"]);
+    write("[kinodynamic]\nfriktion = 0.5\n");
+    refused(folder, &arguments, &["settings.toml", "friktion", "friction"]);
+    write("[kinodynamic]\nfriction = -1.0\n");
+    refused(folder, &arguments, &["settings.toml", "kinodynamic.friction", "-1", "0.1 to 2"]);
+    write("[kinodynamic.weights]\nq_m = nan\n");
+    refused(folder, &arguments, &["settings.toml", "kinodynamic.weights.q_m", "NaN"]);
+    for (option, value, right) in [
+        ("--time-scale", "9", "0.5 to 4"),
+        ("--time-scale", "nan", "NaN"),
+        ("--ball", "3,0", "kinodynamic.ball[0]"),
+        ("--aim", "170", "kinodynamic.aim"),
+        ("--foot-speed", "-3", "kinodynamic.foot_speed"),
+        ("--rate", "7", "60 to 480"),
+    ] {
+        refused(folder, &[&WHOLE[..], &[option, value]].concat(), &[right]);
+    }
+}
+
+/// The stage that failed is named, and nothing is written that could be taken for a result.
+#[test]
+fn a_clip_without_a_kick() {
+    let folder = workspace();
+    // The first frame over and over: somebody who stands.
+    edit(folder.path().join("kick_01.amc"), |text| {
+        let is_number = |line: &&str| line.trim().parse::<usize>().is_ok();
+        let header: Vec<&str> = text.lines().take_while(|line| !is_number(line)).collect();
+        let pose: Vec<&str> =
+            text.lines().skip_while(|line| !is_number(line)).skip(1).take_while(|line| !is_number(line)).collect();
+        let frames = (1..=60).map(|frame| format!("{frame}\n{}\n", pose.join("\n")));
+        format!("{}\n{}", header.join("\n"), frames.collect::<String>())
+    });
+    refused(folder.path(), &WHOLE, &["kick_01.amc", "no kick", "rescaling"]);
 }

@@ -2,9 +2,10 @@
 
 use std::path::Path;
 
-use instep_motion::reference::Reference;
+use instep_motion::reference::{Reference, ReferenceKind};
+use serde_json::Value;
 
-use crate::support::{clip, instep, listing, object, project};
+use crate::support::{clip, instep, listing, object, prestoe, project};
 
 /// The keys that the issue promises.
 const KEYS: [&str; 11] = [
@@ -26,7 +27,8 @@ fn a_clip_becomes_a_reference_that_can_be_kicked_with() {
     let folder = tempfile::tempdir().unwrap();
     let (asf, amc) = (clip("kick.asf"), clip("kick_01.amc"));
     let (asf, amc) = (asf.to_str().unwrap(), amc.to_str().unwrap());
-    let arguments = ["retarget", "--skeleton", asf, "--clip", amc, "--robot", "prestoe", "--clip-rate", "60", "--json"];
+    let arguments =
+        ["retarget", "--skeleton", asf, "--clip", amc, "--clip-rate", "60", "--stage", "kinematic", "--json"];
     let done = object(&instep(folder.path(), &arguments));
     for key in KEYS {
         assert!(!done[key].is_null(), "{key}");
@@ -49,7 +51,9 @@ fn a_clip_becomes_a_reference_that_can_be_kicked_with() {
 #[test]
 fn a_bvh_says_the_same_as_the_amc() {
     let folder = tempfile::tempdir().unwrap();
-    let run = |arguments: &[&str]| object(&instep(folder.path(), &[&["retarget", "--json"], arguments].concat()));
+    let run = |arguments: &[&str]| {
+        object(&instep(folder.path(), &[&["retarget", "--stage", "kinematic", "--json"], arguments].concat()))
+    };
     let (amc, bvh) = (clip("kick_01.amc"), clip("kick.bvh"));
     let amc =
         run(&["--clip", amc.to_str().unwrap(), "--clip-rate", "60", "--skeleton", clip("kick.asf").to_str().unwrap()]);
@@ -72,9 +76,126 @@ fn the_command_of_the_issue() {
     for name in ["10.asf", "10_03.amc"] {
         std::fs::copy(clips.join(name), folder.path().join(name)).unwrap();
     }
-    let arguments = ["retarget", "--skeleton", "10.asf", "--clip", "10_03.amc", "--robot", "prestoe", "--json"];
+    let arguments = ["retarget", "--skeleton", "10.asf", "--clip", "10_03.amc", "--stage", "kinematic", "--json"];
     let done = object(&instep(folder.path(), &arguments));
     assert_eq!(done["frames"], 362);
     assert_eq!(done["kick_foot"], "right");
     assert!((done["t_impact"].as_f64().unwrap() - 1.13).abs() < 0.02, "{}", done["t_impact"]);
+}
+
+/// The keys that the kinodynamic stage adds.
+const WHOLE_KEYS: [&str; 9] = [
+    "stage_seconds",
+    "iterations",
+    "violations",
+    "torque_violations",
+    "root_wrench_residual",
+    "foot_speed_at_impact",
+    "foot_speed_limits",
+    "time_scale",
+    "approach_angle",
+];
+
+/// The arguments of all stages on the project's own clip, on few nodes.
+fn whole<'a>(asf: &'a str, amc: &'a str, more: &[&'a str]) -> Vec<&'a str> {
+    let coarse = ["retarget", "--skeleton", asf, "--clip", amc, "--clip-rate", "60", "--rate", "120", "--json"];
+    [&coarse[..], more].concat()
+}
+
+fn own_clip() -> [String; 2] {
+    ["kick.asf", "kick_01.amc"].map(|name| clip(name).to_str().unwrap().to_owned())
+}
+
+/// The object that a run printed which found no motion that the robot can do.
+fn not_feasible(folder: &Path, output: &std::process::Output, code: i32) -> Value {
+    assert_eq!(output.status.code(), Some(code), "{}", String::from_utf8_lossy(&output.stderr));
+    let done: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(done["kind"], "infeasible");
+    let reference = Reference::load(&folder.join(done["reference"].as_str().unwrap())).unwrap();
+    assert_eq!(reference.kind, ReferenceKind::Infeasible);
+    let html = std::fs::read_to_string(folder.join(done["report"].as_str().unwrap())).unwrap();
+    assert!(html.contains("NOT FEASIBLE"));
+    done
+}
+
+#[test]
+fn a_clip_becomes_a_motion_that_the_robot_can_do() {
+    let folder = tempfile::tempdir().unwrap();
+    let [asf, amc] = own_clip();
+    // A kick that is not pushed to the limits needs fewer nodes.
+    let calm = "[kinodynamic]\nrate = 120.0\n[kinodynamic.weights]\nq_i = [0.0, 0.0, 0.0]\nq_a = 2e-7\n";
+    std::fs::write(folder.path().join("calm.toml"), calm).unwrap();
+    let calm = ["--clip-rate", "60", "--settings", "calm.toml", "--time-scale", "1.1", "--json"];
+    let arguments = [&["retarget", "--skeleton", &asf, "--clip", &amc][..], &calm].concat();
+    let done = object(&instep(folder.path(), &arguments));
+    for key in KEYS.iter().chain(&WHOLE_KEYS) {
+        assert!(!done[key].is_null(), "{key}");
+    }
+    assert_eq!((&done["status"], &done["kind"]), (&"solved".into(), &"kinodynamic".into()));
+    assert_eq!(done["time_scale"], 1.1);
+    assert_eq!(done["torque_violations"], 0);
+    assert!(done["root_wrench_residual"].as_f64().unwrap() < 0.01, "{}", done["root_wrench_residual"]);
+    for (family, worst) in done["violations"].as_object().unwrap() {
+        assert!(worst.as_f64().unwrap() <= 1e-4, "{family}: {worst}");
+    }
+    for stage in ["rescaling", "kinematic", "kinodynamic", "verification"] {
+        assert!(done["stage_seconds"][stage].as_f64().unwrap() >= 0.0, "{stage}");
+    }
+    let reference = Reference::load(&folder.path().join(done["reference"].as_str().unwrap())).unwrap();
+    assert!(reference.rate >= 240.0, "{}", reference.rate);
+    assert!(reference.knots.iter().all(|knot| knot.torques.len() == 25 && knot.forces.len() == 10));
+}
+
+#[test]
+fn a_motion_that_breaks_the_law_between_its_nodes_is_marked() {
+    let folder = tempfile::tempdir().unwrap();
+    let [asf, amc] = own_clip();
+    // Sixty nodes a second do not show a kick.
+    let output = instep(folder.path(), &whole(&asf, &amc, &[]));
+    let done = not_feasible(folder.path(), &output, 1);
+    assert_eq!(done["status"], "unverified");
+    assert_eq!(done["failure"]["stage"], "verification");
+}
+
+#[test]
+fn a_robot_that_is_too_weak_is_told_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let [asf, amc] = own_clip();
+    let weak = folder.path().join("weak");
+    std::fs::create_dir(&weak).unwrap();
+    std::fs::copy(prestoe().join("prestoe.xml"), weak.join("prestoe.xml")).unwrap();
+    let text = std::fs::read_to_string(prestoe().join("robot.toml")).unwrap();
+    let lines = text.lines().map(|line| match line.strip_prefix("torque = ") {
+        Some(number) => format!("torque = {}", 0.1 * number.trim().parse::<f64>().unwrap()),
+        None => line.to_owned(),
+    });
+    std::fs::write(weak.join("robot.toml"), lines.collect::<Vec<_>>().join("\n")).unwrap();
+    let output = instep(folder.path(), &whole(&asf, &amc, &["--robot", "./weak"]));
+    let done = not_feasible(folder.path(), &output, 1);
+    assert!(["infeasible", "out_of_iterations"].contains(&done["status"].as_str().unwrap()), "{}", done["status"]);
+    assert_eq!(done["failure"]["stage"], "kinodynamic");
+    let family = done["failure"]["family"].as_str().unwrap();
+    assert!(done["violations"][family].as_f64().unwrap() > 1e-3, "{family}");
+}
+
+#[cfg(unix)]
+#[test]
+fn ctrl_c_keeps_the_best_motion() {
+    let folder = tempfile::tempdir().unwrap();
+    let [asf, amc] = own_clip();
+    let mut arguments = whole(&asf, &amc, &[]);
+    // Nodes enough that it would take longer.
+    arguments.iter_mut().filter(|a| **a == "120").for_each(|a| *a = "480");
+    let child = std::process::Command::new(env!("CARGO_BIN_EXE_instep"))
+        .args(&arguments)
+        .current_dir(folder.path())
+        .stdout(std::process::Stdio::piped())
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    std::thread::sleep(std::time::Duration::from_millis(1500));
+    let killed = std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(killed.success());
+    let done = not_feasible(folder.path(), &child.wait_with_output().unwrap(), 130);
+    assert_eq!(done["status"], "stopped");
 }
