@@ -325,7 +325,7 @@ impl Done {
 
     fn stage(&self) -> &'static str {
         match (&self.kinodynamic, self.form) {
-            (Some(_), _) => "all stages, verified by full inverse dynamics",
+            (Some(_), _) => "all stages, checked by full inverse dynamics",
             (None, Form::Slip) => "kinematic stage, the clip's foot slip kept",
             (None, Form::Enforced) => "kinematic stage, standing feet stand still",
         }

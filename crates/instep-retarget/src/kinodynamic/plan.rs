@@ -329,7 +329,7 @@ fn aim_turn(start: &Retargeted, ball: &Vector3<f64>, settings: &KinodynamicSetti
     let [least, greatest] = settings.approach_angle;
     let spare = (0.25 * (greatest - least)).min(0.01);
     let wanted = angle.abs().clamp(least + spare, (greatest - spare).max(least + spare));
-    (wanted - angle.abs()) * if angle < 0.0 { -1.0 } else { 1.0 }
+    (wanted - angle.abs()) * if angle < 0.0 { -1.0 } else { 1.0 } + 0.0
 }
 
 fn keypoints(targets: &Targets, weights: &Weights) -> Vec<(LinkPoint, f64)> {

@@ -23,6 +23,8 @@ pub const MAX_ROOT_WRENCH: f64 = 0.01;
 pub const MAX_SLIP: f64 = 1e-3;
 /// Deepest point below the ground and deepest overlap of capsules, m; largest force outside its cone, share of m g.
 pub const MAX_DEPTH: f64 = 1e-4;
+/// Torque that shares are taken of where the drive gives less, as a share of its limit.
+const LEAST_TORQUE: f64 = 0.01;
 /// What rounding in the reference may add to a limit, as a share of it.
 const ROUNDING: f64 = 1e-6;
 
@@ -124,7 +126,8 @@ pub fn verify(robot: &Robot, reference: &Reference, rate: f64, friction: f64) ->
             found.speed_violations += usize::from(!(speed.abs() <= joint.speed * (1.0 + ROUNDING)));
             let range = joint.range[0] - ROUNDING..=joint.range[1] + ROUNDING;
             found.joint_violations += usize::from(!range.contains(&angle));
-            let bound = if torque < 0.0 { -least } else { greatest }.max(1e-9);
+            // At its greatest speed a drive gives nothing; a share of nothing would say nothing.
+            let bound = if torque < 0.0 { -least } else { greatest }.max(LEAST_TORQUE * joint.torque);
             note(&mut found.torque_use, &joint.name, torque.abs() / bound);
             note(&mut found.speed_use, &joint.name, speed.abs() / joint.speed);
             if (reference.phases.t_swing..=reference.phases.t_impact).contains(&t) {

@@ -10,7 +10,7 @@ use instep_report::{
 use instep_retarget::kinodynamic::Kinodynamic;
 use instep_retarget::kinodynamic::verify::{MAX_ROOT_WRENCH, MAX_SLIP};
 use instep_robot::control::torque_range;
-use instep_robot::{LinkPoint, RobotData};
+use instep_robot::{LinkPoint, Robot, RobotData};
 use nalgebra::Vector3;
 
 use super::page::APART;
@@ -35,7 +35,7 @@ struct Shown<'a> {
 }
 
 impl<'a> Shown<'a> {
-    fn new(reference: &'a Reference) -> Self {
+    fn new(robot: &Robot, reference: &'a Reference) -> Self {
         let (times, knots): (Vec<f64>, Vec<&Knot>) =
             reference.knots.iter().enumerate().step_by(2).map(|(k, knot)| (k as f64 / reference.rate, knot)).unzip();
         let state = |knot: &&Knot| {
@@ -43,7 +43,7 @@ impl<'a> Shown<'a> {
             (q, [&knot.base_velocity[..], &knot.base_angular_velocity, &knot.joint_velocities].concat())
         };
         let states = knots.iter().map(state).collect();
-        let mut regions: Vec<Region> = phases(reference)
+        let mut regions: Vec<Region> = phases(robot, reference)
             .into_iter()
             .filter(|(name, ..)| *name != "support")
             .map(|(name, from, to)| Region { label: name.into(), from, to })
@@ -66,12 +66,11 @@ impl<'a> Shown<'a> {
 }
 
 /// The six phases of an instep kick: name, from, to, s. They overlap: the support foot stands through most of them.
-fn phases(reference: &Reference) -> Vec<(&'static str, f64, f64)> {
+fn phases(robot: &Robot, reference: &Reference) -> Vec<(&'static str, f64, f64)> {
     let p = &reference.phases;
     let end = reference.duration();
     let touches = |side: Side, knot: &Knot| {
-        let prefix = format!("{side}_");
-        reference.contact_names.iter().zip(&knot.contacts).any(|(name, on)| *on && name.starts_with(&prefix))
+        robot.contacts.iter().zip(&knot.contacts).any(|(contact, on)| *on && contact.leg == side)
     };
     let time = |k: usize| k as f64 / reference.rate;
     let impact = ((p.t_impact * reference.rate) as usize).min(reference.knots.len() - 1);
@@ -95,7 +94,7 @@ fn phases(reference: &Reference) -> Vec<(&'static str, f64, f64)> {
 /// The whole page.
 pub(super) fn page(done: &Done, k: &Kinodynamic) -> Report {
     let clip = done.clip_file.file_name().unwrap_or_default().to_string_lossy();
-    let shown = Shown::new(&k.reference);
+    let shown = Shown::new(&done.robot, &k.reference);
     let mut data = done.robot.data();
     let speeds = link_speeds(done, &shown, &mut data);
     let mut notes = vec![
@@ -112,7 +111,10 @@ pub(super) fn page(done: &Done, k: &Kinodynamic) -> Report {
     notes.extend(summary::advice(k));
     notes.push(format!("Motion data: {}", k.reference.source.acknowledgement));
     Report {
-        title: format!("{clip} as {} can do it", done.robot.name),
+        title: match k.status.feasible() {
+            true => format!("{clip} as {} can do it", figure::capital(&done.robot.name)),
+            false => format!("{clip}: not what {} can do", figure::capital(&done.robot.name)),
+        },
         subtitle: format!("{} \u{b7} {} \u{b7} time scale {}", done.stage(), done.robot.title, k.time_scale),
         summary: items(k),
         tables: tables(done, k, &shown, &speeds),
@@ -174,7 +176,7 @@ fn items(k: &Kinodynamic) -> Vec<SummaryItem> {
 
 fn tables(done: &Done, k: &Kinodynamic, shown: &Shown, speeds: &[(&str, Vec<f64>)]) -> Vec<Table> {
     let impact = k.reference.phases.t_impact;
-    let phases = phases(&k.reference).into_iter().map(|(name, from, to)| {
+    let phases = phases(&done.robot, &k.reference).into_iter().map(|(name, from, to)| {
         vec![name.into(), format!("{from:.3}").into(), format!("{to:.3}").into(), format!("{:.3}", to - from).into()]
     });
     // The peak before the leg comes down again: around the impact, not in the run-up.
@@ -361,7 +363,7 @@ fn plots(done: &Done, shown: &Shown, speeds: &[(&str, Vec<f64>)], data: &mut Rob
         };
         let torque = joints(&|j, knot| {
             let (torque, [least, most]) = (knot.torques[j], torque_range(&robot.joints[j], knot.joint_velocities[j]));
-            torque / if torque < 0.0 { -least } else { most }.max(1e-9)
+            torque / if torque < 0.0 { -least } else { most }.max(0.01 * robot.joints[j].torque)
         });
         let speed = joints(&|j, knot| knot.joint_velocities[j] / robot.joints[j].speed);
         let name = figure::capital(group);

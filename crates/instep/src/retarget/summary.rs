@@ -62,10 +62,9 @@ pub(super) fn advice(k: &Kinodynamic) -> Option<String> {
     let hard = ["base_dynamics", "torque", "torque_violations", "joint_speed", "friction", "contact", "joint_limit"];
     hard.contains(&family).then(|| {
         format!(
-            "The clip's timing (time scale {}) is beyond this robot as far as the solver can tell; a slower one, such as \
-             --time-scale {:.1}, asks for less.",
-            k.time_scale,
-            k.time_scale + 0.3
+            "The clip's timing (time scale {}) is beyond this robot as far as the solver can tell. A larger --time-scale \
+             asks for less speed, but for higher jumps where the human leaves the ground.",
+            k.time_scale
         )
     })
 }
