@@ -35,6 +35,10 @@ pub struct CellKey {
     pub seed: u64,
     /// Number of requests.
     pub requests: usize,
+    /// Of the robot, its settings and the scenario: a kept cell counts only while these are the same. It does not see
+    /// a change of the program.
+    #[serde(default)]
+    pub fingerprint: u64,
 }
 
 /// What came of one accepted request.

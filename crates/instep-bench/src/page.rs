@@ -14,8 +14,8 @@ pub fn page(rows: &[Row], notes: Vec<String>) -> Report {
         let verdict = match column {
             6 => row.hit_rate.map(|rate| rate >= 0.98),
             7 => row.upright_rate.map(|rate| rate >= 0.98),
-            16 => Some(row.audit_invalid == 0),
-            17 => Some(row.limit_violations == 0),
+            14 => Some(row.audit_invalid == 0),
+            15 => Some(row.limit_violations == 0),
             _ => None,
         };
         let verdict = verdict.map_or(Verdict::Neutral, |good| if good { Verdict::Good } else { Verdict::Bad });

@@ -43,6 +43,7 @@ impl Bench {
                             scenario: scenario.name.clone(),
                             seed,
                             requests: self.requests,
+                            fingerprint: fingerprint(subject, scenario),
                         });
                     }
                 }
@@ -109,4 +110,11 @@ impl Bench {
             })
             .collect()
     }
+}
+
+/// FNV-1a over what a cell's result depends on, besides the program.
+fn fingerprint(subject: &Subject, scenario: &Scenario) -> u64 {
+    let robot = &subject.robot;
+    let text = format!("{:?} {:?} {:?} {:?} {scenario:?}", robot.joints, robot.stand, robot.mass(), subject.dynamic);
+    text.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
 }

@@ -163,19 +163,20 @@ pub fn text_table(rows: &[Row]) -> (Vec<&'static str>, Vec<Vec<String>>) {
         "refused",
         "hit %",
         "upright %",
-        "ball m/s",
-        "of asked",
-        "dir. median deg",
-        "dir. p90 deg",
+        "ball m/s (of asked)",
+        "off deg p50/p90",
         "rolled m",
         "contact s",
-        "plan p99 ms",
-        "tick p99 us",
+        "plan ms p50/p99",
+        "tick us p50/p99",
         "audit invalid",
-        "limit violations",
+        "beyond limits",
     ];
     let number = |value: Option<f64>, factor: f64, digits: usize| {
         value.map_or_else(|| "-".to_owned(), |v| format!("{:.digits$}", v * factor))
+    };
+    let pair = |a: Option<f64>, b: Option<f64>, factor: f64, digits: usize| {
+        format!("{}/{}", number(a, factor, digits), number(b, factor, digits))
     };
     let body = rows
         .iter()
@@ -189,14 +190,12 @@ pub fn text_table(rows: &[Row]) -> (Vec<&'static str>, Vec<Vec<String>>) {
                 r.refused.to_string(),
                 number(r.hit_rate, 100.0, 1),
                 number(r.upright_rate, 100.0, 1),
-                number(r.ball_speed_median, 1.0, 2),
-                number(r.speed_ratio_median, 1.0, 2),
-                number(r.direction_error_median_deg, 1.0, 1),
-                number(r.direction_error_p90_deg, 1.0, 1),
+                format!("{} ({})", number(r.ball_speed_median, 1.0, 2), number(r.speed_ratio_median, 1.0, 2)),
+                pair(r.direction_error_median_deg, r.direction_error_p90_deg, 1.0, 1),
                 number(r.distance_median, 1.0, 2),
                 number(r.contact_median_s, 1.0, 2),
-                number(r.plan_p99_s, 1e3, 2),
-                number(Some(r.tick_p99_s), 1e6, 0),
+                pair(r.plan_p50_s, r.plan_p99_s, 1e3, 1),
+                pair(Some(r.tick_p50_s), Some(r.tick_p99_s), 1e6, 0),
                 r.audit_invalid.to_string(),
                 r.limit_violations.to_string(),
             ]

@@ -319,14 +319,19 @@ impl Ik {
     /// The box-constrained damped least-squares step, into `self.step`.
     fn least_squares(&mut self, angles: &[f64], damping: f64) {
         let n = self.unknowns.len();
-        for i in 0..n {
-            for j in 0..=i {
-                let sum: f64 = (0..ROWS).map(|r| self.jacobian[r][i] * self.jacobian[r][j]).sum();
-                self.normal[i][j] = sum;
-                self.normal[j][i] = sum;
+        // Row by row and over all columns, so that the compiler can use wide registers; unused columns stay zero.
+        self.normal = [[0.0; UNKNOWNS]; UNKNOWNS];
+        self.gradient = [0.0; UNKNOWNS];
+        for (row, error) in self.jacobian.iter().zip(self.error) {
+            for (i, left) in row.iter().enumerate().take(n) {
+                for (entry, right) in self.normal[i].iter_mut().zip(row) {
+                    *entry += left * right;
+                }
+                self.gradient[i] += left * error;
             }
+        }
+        for i in 0..n {
             self.normal[i][i] += damping;
-            self.gradient[i] = (0..ROWS).map(|r| self.jacobian[r][i] * self.error[r]).sum();
         }
         let mut fixed = [false; UNKNOWNS];
         self.step = [0.0; UNKNOWNS];

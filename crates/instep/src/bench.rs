@@ -36,9 +36,10 @@ pub(crate) struct Bench {
     /// Folder for bench.md, bench.csv, bench.json and bench.html
     #[arg(long, value_name = "FOLDER", default_value = "out/bench")]
     out: PathBuf,
-    /// File that keeps finished cells: a run that was stopped goes on from there
-    #[arg(long, value_name = "FILE")]
-    resume: Option<PathBuf>,
+    /// Goes on with a run that was stopped, from the cells kept in FILE [default: cells.jsonl in the --out folder, where
+    /// every run keeps its own]
+    #[arg(long, value_name = "FILE", num_args = 0..=1)]
+    resume: Option<Option<PathBuf>>,
 }
 
 impl From<BenchError> for Failure {
@@ -61,11 +62,23 @@ impl Bench {
         for file in &names {
             files::check_file(file)?;
         }
+        let kept = match &self.resume {
+            Some(Some(file)) => file.clone(),
+            _ => self.out.join("cells.jsonl"),
+        };
+        files::check_file(&kept)?;
+        let unusable = |e: std::io::Error| Failure::input(format!("{}: cannot be written: {e}", kept.display()));
+        if let Some(folder) = kept.parent() {
+            std::fs::create_dir_all(folder).map_err(unusable)?;
+        }
+        if self.resume.is_none() {
+            std::fs::write(&kept, "").map_err(unusable)?;
+        }
         let bar = ProgressBar::new(bench.cells().len() as u64);
         if let Ok(style) = ProgressStyle::with_template("{wide_bar} {pos}/{len} {msg} {eta}") {
             bar.set_style(style);
         }
-        let cells = bench.run(self.resume.as_deref(), &|done, _, key| {
+        let cells = bench.run(Some(&kept), &|done, _, key| {
             bar.set_position(done as u64);
             bar.set_message(format!("{} {} {}", key.engine, key.robot, key.scenario));
         })?;
@@ -113,12 +126,12 @@ impl Bench {
             subject.engine(engine)?;
         }
         let (requests, seeds) = if self.quick { (20, 1) } else { (200, 3) };
-        Ok(KickBench {
-            engines: self.engine.clone(),
-            subjects,
-            scenarios,
-            seeds: (1..=self.seeds.unwrap_or(seeds)).collect(),
-            requests: self.requests.unwrap_or(requests),
-        })
+        let (requests, seeds) = (self.requests.unwrap_or(requests), self.seeds.unwrap_or(seeds));
+        for (option, number) in [("--requests", requests as u64), ("--seeds", seeds)] {
+            if !(1..=1_000_000).contains(&number) {
+                return Err(Failure::input(format!("{option}: {number}; expected a number from 1 to 1000000")));
+            }
+        }
+        Ok(KickBench { engines: self.engine.clone(), subjects, scenarios, seeds: (1..=seeds).collect(), requests })
     }
 }

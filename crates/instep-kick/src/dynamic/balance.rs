@@ -133,8 +133,17 @@ mod tests {
     #[test]
     fn a_lean_forward_moves_the_body_back() {
         let pid = Pid { p: 0.3, i: 0.5, d: 0.0, limit: 0.02 };
-        let on =
-            Feedback { on: true, x: pid, y: pid, filter: 0.0, tilt: 1.0, rate: 0.1, moment: 0.5, follow_ball: false };
+        let on = Feedback {
+            on: true,
+            x: pid,
+            y: pid,
+            filter: 0.0,
+            tilt: 1.0,
+            rate: 0.1,
+            moment: 0.5,
+            catch: 0.1,
+            follow_ball: false,
+        };
         let mut balance = Balance::new(on);
         let shift = balance.shift(Some([0.02, -0.01]), [0.0, 0.0], (true, true), 0.01);
         assert!(shift[0] < 0.0 && shift[1] > 0.0);

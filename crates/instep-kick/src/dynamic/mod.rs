@@ -75,6 +75,8 @@ pub struct DynamicKick {
     status: KickStatus,
     hold: bool,
     cancel: bool,
+    /// The swing foot went down early because the robot tipped toward it.
+    caught: bool,
     planned_cop: [f64; 2],
     follow: Option<Follow>,
     /// Scratch of the follower's checks.
@@ -121,6 +123,7 @@ impl DynamicKick {
             status: KickStatus::Idle,
             hold: false,
             cancel: false,
+            caught: false,
             planned_cop: [0.0; 2],
             body,
             settings,
@@ -257,6 +260,25 @@ impl DynamicKick {
         up.cross(&wanted)
     }
 
+    /// Puts the swing foot down at once when the robot tips toward it after the contact.
+    fn catch(&mut self, tilt: &Vector3<f64>, sensors: &Sensors, ahead: f64) {
+        let time = self.clock + ahead;
+        let swing = self.motion.swing;
+        if self.caught
+            || !self.settings.feedback.on
+            || !matches!(self.motion.phase(time), Phase::MoveBack | Phase::Lower)
+        {
+            return;
+        }
+        let fall_time = (self.body.stand(swing).com.z / 9.81).sqrt();
+        let lean = -Body::sign(swing) * (tilt.x + fall_time * sensors.gyro[0]);
+        // A NaN is no lean.
+        if lean > self.settings.feedback.catch {
+            self.motion = self.motion.caught(&self.body, &self.settings, time);
+            self.caught = true;
+        }
+    }
+
     /// The moment of the inertial sensor's loop on the body, in the base frame, N m.
     fn inertial(&self, sensors: &Sensors) -> Vector3<f64> {
         let swing = self.motion.swing;
@@ -304,6 +326,7 @@ impl Controller for DynamicKick {
         let both = self.motion.both_feet(self.clock);
         let measured = self.measured(sensors);
         let tilt = self.tilt(sensors);
+        self.catch(&tilt, sensors, ahead);
         let steady = tilt.norm() < STEADY_TILT && measured.is_none_or(|at| self.inside(at, swing.other()));
         let shift = self.balance.shift(measured, self.planned_cop, (self.running(), steady), dt);
         // The plan, without feedback: its differences give speeds and torques that feedback must not shake.
@@ -368,6 +391,7 @@ impl KickEngine for DynamicKick {
         self.status = KickStatus::Running;
         self.hold = request.hold;
         self.cancel = false;
+        self.caught = false;
         self.balance = Balance::new(self.settings.feedback);
         self.angles.copy_from_slice(&self.body.angles);
         self.body.tree.update(&self.angles, &mut self.now);

@@ -231,6 +231,27 @@ impl Motion {
         motion
     }
 
+    /// The foot straight to its place on the ground and the weight between the feet, from `time` after the contact: for
+    /// a robot that tips toward the swing foot.
+    pub(crate) fn caught(&self, body: &Body, settings: &DynamicSettings, time: f64) -> Self {
+        let stand = body.stand(self.swing);
+        let [yaw, pitch] = stand.yaw_pitch;
+        let mut motion = *self;
+        motion.foot = Path::starting(time, self.foot.at(time));
+        motion.trunk = Path::starting(time, self.trunk.at(time));
+        let home = [stand.home.x, stand.home.y, stand.home.z, yaw, pitch];
+        motion.foot.to(settings.times.lower, State::at_rest(home));
+        motion.ends[4] = motion.foot.end();
+        motion.ends[5] = motion.foot.end();
+        // The body is on its way to the middle already: it gets there with the foot's landing or soon after.
+        motion
+            .trunk
+            .to(settings.times.lower + 0.5 * settings.times.shift_back, State::at_rest(trunk_stand(body, self.swing)));
+        motion.foot.hold(motion.trunk.end() - motion.foot.end());
+        motion.ends[6] = motion.trunk.end();
+        motion
+    }
+
     /// Another stroke from `time` in the wind-up, for a ball that has moved.
     pub(crate) fn retargeted(&self, body: &Body, settings: &DynamicSettings, time: f64, stroke: &Stroke) -> Self {
         let mut motion = *self;

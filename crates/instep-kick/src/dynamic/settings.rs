@@ -166,6 +166,9 @@ pub struct Feedback {
     pub rate: f64,
     /// Largest ankle moment of both together, in units of m g times the foot's half-length or half-width.
     pub moment: f64,
+    /// Lean toward the swing foot (tilt, plus rate times sqrt(h / g)), rad, beyond which that foot goes straight to the
+    /// ground once the ball is gone: 0.05 to 0.3.
+    pub catch: f64,
     /// Follow the ball that is seen moving during the wind-up.
     pub follow_ball: bool,
 }
@@ -265,6 +268,7 @@ impl DynamicSettings {
             ("feedback.tilt", f.tilt, 0.0, 10.0),
             ("feedback.rate", f.rate, 0.0, 10.0),
             ("feedback.moment", f.moment, 0.0, 1.0),
+            ("feedback.catch", f.catch, 0.05, 0.3),
         ] {
             within(field, value, low, high)?;
         }

@@ -107,7 +107,10 @@ pub(super) fn load(path: &Path) -> Result<Vec<KickRequest>, Failure> {
         return serde_json::from_str(&text).map_err(|e| wrong(e.to_string()));
     }
     let lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
-    lines.map(|(i, line)| serde_json::from_str(line).map_err(|e| wrong(format!("line {}: {e}", i + 1)))).collect()
+    let expected = "expected a JSON array of requests, or one request a line";
+    lines
+        .map(|(i, line)| serde_json::from_str(line).map_err(|e| wrong(format!("line {}: {e}; {expected}", i + 1))))
+        .collect()
 }
 
 impl Wanted {
