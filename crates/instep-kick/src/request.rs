@@ -5,6 +5,7 @@
 //! other teams (facts/kick-interfaces.md, A to F) are read in [`crate::dialect`].
 
 use instep_motion::phase::Side;
+use instep_robot::Robot;
 use serde::{Deserialize, Serialize};
 
 /// How strong a kick should be.
@@ -217,6 +218,27 @@ pub enum Refusal {
 }
 
 impl Refusal {
+    /// The message for people, with the names of `robot`'s joints and, for a kick that is too fast, what would not be.
+    #[must_use]
+    pub fn explain(&self, robot: &Robot) -> String {
+        let name = |joint: usize| robot.joints.get(joint).map_or("?", |joint| joint.name.as_str());
+        match self {
+            Self::TooFast { foot, asked, share, joint } => format!(
+                "{asked:.2} m/s at the {foot} foot asks {share:.2} times what {} can do; ask for a foot of at most about \
+                 {:.2} m/s, or a ball nearer to the foot's front",
+                name(*joint),
+                0.97 * asked / share,
+            ),
+            Self::TooHeavy { foot, share, joint } => {
+                format!("with the {foot} foot {} would have to hold {share:.2} times what its motor can", name(*joint))
+            }
+            Self::NotStanding { joint, off } => {
+                format!("the robot is not in its standing pose: {} is {off:.2} rad off", name(*joint))
+            }
+            other => other.to_string(),
+        }
+    }
+
     /// A short name for tables.
     #[must_use]
     pub fn name(&self) -> &'static str {

@@ -195,8 +195,10 @@ impl DynamicSettings {
     pub fn load(path: &Path) -> Result<Self, KickError> {
         let file = if path.is_dir() { path.join("dynamic.toml") } else { path.to_owned() };
         let name = file.display().to_string();
-        let text = std::fs::read_to_string(&file)
-            .map_err(|e| KickError::Read { file: name.clone(), detail: e.to_string() })?;
+        let text = std::fs::read_to_string(&file).map_err(|e| KickError::Read {
+            file: name.clone(),
+            detail: format!("{e}; expected the dynamic engine's settings for this robot"),
+        })?;
         Self::parse(&name, &text)
     }
 

@@ -71,7 +71,7 @@ pub(super) fn run(
             seed,
         };
         let (outcome, plan_s, _) = run_case(subject, &case, engine.as_mut(), &mut world, &mut Vec::new())?;
-        let refused = outcome.as_ref().err().map(|r| Refused { cause: r.name(), message: r.to_string() });
+        let refused = outcome.as_ref().err().map(|r| Refused { cause: r.name(), message: r.explain(&subject.robot) });
         let kicked = outcome.ok();
         let direction_error_deg = kicked.and_then(|k| k.direction_error).map(f64::to_degrees);
         answers.push(Answer { request: *request, refused, kicked, direction_error_deg, plan_s });
@@ -103,6 +103,9 @@ fn line(answer: &Answer) -> String {
 pub(super) fn load(path: &Path) -> Result<Vec<KickRequest>, Failure> {
     let wrong = |detail: String| Failure::input(format!("{}: {detail} (--requests)", path.display()));
     let text = std::fs::read_to_string(path).map_err(|e| wrong(format!("cannot be read: {e}; expected JSON")))?;
+    if text.trim().is_empty() {
+        return Err(wrong("holds no request; expected a JSON array of requests, or one request a line".into()));
+    }
     if text.trim_start().starts_with('[') {
         return serde_json::from_str(&text).map_err(|e| wrong(e.to_string()));
     }
