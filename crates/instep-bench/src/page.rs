@@ -12,10 +12,10 @@ pub fn page(rows: &[Row], notes: Vec<String>) -> Report {
         head.iter().enumerate().map(|(i, title)| if i < 3 { Column::text(*title) } else { Column::number(*title) });
     let judged = |column: usize, text: &str, row: &Row| {
         let verdict = match column {
-            6 => row.hit_rate.map(|rate| rate >= 0.98),
-            7 => row.upright_rate.map(|rate| rate >= 0.98),
-            14 => Some(row.audit_invalid == 0),
-            15 => Some(row.limit_violations == 0),
+            5 => row.hit_rate.map(|rate| rate >= 0.98),
+            6 => row.upright_rate.map(|rate| rate >= 0.98),
+            13 => Some(row.audit_invalid == 0),
+            14 => Some(row.limit_violations == 0),
             _ => None,
         };
         let verdict = verdict.map_or(Verdict::Neutral, |good| if good { Verdict::Good } else { Verdict::Bad });
@@ -24,13 +24,12 @@ pub fn page(rows: &[Row], notes: Vec<String>) -> Report {
     let cells = body.iter().zip(rows).map(|(texts, row)| {
         texts.iter().enumerate().map(|(column, text)| judged(column, text, row)).collect::<Vec<_>>()
     });
-    let why = rows.iter().map(|row| {
+    let why = rows.iter().filter(|row| row.refused > 0).map(|row| {
         let causes = row.refused_why.iter().map(|(cause, count)| format!("{cause} {count}")).collect::<Vec<_>>();
         vec![
             Cell::from(row.engine.as_str()),
             row.robot.as_str().into(),
             row.scenario.as_str().into(),
-            row.seed.to_string().into(),
             causes.join(", ").into(),
         ]
     });
@@ -47,7 +46,7 @@ pub fn page(rows: &[Row], notes: Vec<String>) -> Report {
             Table { title: "Results".into(), columns: columns.collect(), rows: cells.collect() },
             Table {
                 title: "Why requests were refused".into(),
-                columns: ["engine", "robot", "scenario", "seed", "causes"].map(Column::text).to_vec(),
+                columns: ["engine", "robot", "scenario", "causes"].map(Column::text).to_vec(),
                 rows: why.collect(),
             },
         ],

@@ -218,16 +218,14 @@ pub enum Refusal {
 }
 
 impl Refusal {
-    /// The message for people, with the names of `robot`'s joints and, for a kick that is too fast, what would not be.
+    /// The message for people, with the names of `robot`'s joints.
     #[must_use]
     pub fn explain(&self, robot: &Robot) -> String {
         let name = |joint: usize| robot.joints.get(joint).map_or("?", |joint| joint.name.as_str());
         match self {
             Self::TooFast { foot, asked, share, joint } => format!(
-                "{asked:.2} m/s at the {foot} foot asks {share:.2} times what {} can do; ask for a foot of at most about \
-                 {:.2} m/s, or a ball nearer to the foot's front",
-                name(*joint),
-                0.97 * asked / share,
+                "{asked:.2} m/s at the {foot} foot asks {share:.2} times what {} can do; a slower kick may be possible",
+                name(*joint)
             ),
             Self::TooHeavy { foot, share, joint } => {
                 format!("with the {foot} foot {} would have to hold {share:.2} times what its motor can", name(*joint))
