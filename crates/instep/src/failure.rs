@@ -10,6 +10,7 @@ use instep_motion::MotionError;
 use instep_report::ReportError;
 use instep_retarget::RetargetError;
 use instep_robot::RobotError;
+use instep_ros::RosError;
 use instep_sim::SimError;
 
 /// One message, and whether the user can mend its cause.
@@ -74,6 +75,16 @@ impl From<SimError> for Failure {
         match error {
             SimError::Diverged { .. } => Self::other(error),
             _ => Self::input(error),
+        }
+    }
+}
+
+impl From<RosError> for Failure {
+    fn from(error: RosError) -> Self {
+        match error {
+            RosError::Domain { .. } => Self::input(error),
+            RosError::World(error) => error.into(),
+            _ => Self::other(error),
         }
     }
 }

@@ -15,6 +15,7 @@ mod output;
 mod places;
 mod retarget;
 mod robot;
+mod ros;
 
 use std::process::ExitCode;
 
@@ -44,6 +45,8 @@ enum Command {
     /// Look at a robot's own files
     #[command(subcommand)]
     Robot(robot::RobotCommand),
+    /// Offer the kick as a ROS 2 action, for a real or a simulated robot; no ROS has to be installed
+    Ros(ros::Ros),
 }
 
 fn main() -> ExitCode {
@@ -55,6 +58,7 @@ fn main() -> ExitCode {
         Command::Kick(kick) => kick.run(&output),
         Command::Retarget(retarget) => retarget.run(&output),
         Command::Robot(command) => command.run(&output),
+        Command::Ros(ros) => ros.run(&output),
     };
     match done {
         Ok(code) => code,

@@ -41,6 +41,13 @@ impl Output {
         }
     }
 
+    /// Tells what goes on, on standard error, while a command runs.
+    pub(crate) fn remark(&self, line: impl FnOnce(Paint) -> String) {
+        let on = std::io::stderr().is_terminal() && self.colour;
+        // Nobody is left to be told when standard error is closed.
+        let _ = writeln!(std::io::stderr().lock(), "{}", line(Paint { on }));
+    }
+
     /// Tells why the command did not do what was asked.
     pub(crate) fn complain(&self, failure: &Failure) {
         let on = std::io::stderr().is_terminal() && self.colour;
