@@ -189,7 +189,7 @@ impl<F: Form> Wire<F> {
         };
         let Some(frame) = newest else { return ended };
         self.carry_out(&frame);
-        if self.state.frames % SHOWN == 0 {
+        if self.state.frames.is_multiple_of(SHOWN) {
             self.show(&frame);
         }
         let old = self.state.frame.replace(frame);
