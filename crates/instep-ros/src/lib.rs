@@ -18,6 +18,7 @@
 //!
 //! By default nothing leaves the machine and nothing comes in from outside ([`Network::Loopback`]).
 
+mod answers;
 mod body;
 mod control;
 mod endpoints;

@@ -13,14 +13,14 @@ use instep_kick::{KickPlan, KickStatus, Phase, Refusal};
 use instep_motion::phase::Side;
 use instep_robot::Robot;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
-use ros2_client::action::{CancelGoalRequest, GetResultResponse, GoalInfo, GoalStatusEnum, SendGoalResponse};
+use ros2_client::action::{GetResultResponse, GoalStatusEnum, SendGoalResponse};
 use ros2_client::action_msgs::{CancelGoalResponse, CancelGoalResponseEnum, GoalStatus, GoalStatusArray};
 use ros2_client::builtin_interfaces::Time as RosTime;
 use ros2_client::dds::Subscription;
 use ros2_client::dds::rustdds::mio1::{Events, Interest, Poll, Token};
 use ros2_client::{ReadError, RmwRequestId};
-use serde::{Deserialize, Serialize};
 
+use crate::answers::{CancelAsked, cancel_asked, ros_id, ros_info, ros_state};
 use crate::body::{Freshness, Inbox, fallen};
 use crate::control::{Engine, Frame, Order, Trouble, wall_clock};
 use crate::endpoints::Endpoints;
@@ -103,13 +103,6 @@ impl State {
             counts: Counts::default(),
         }
     }
-}
-
-/// `action_msgs/srv/CancelGoal_Request` as it lies in CDR: the library does not let its field be read.
-#[derive(Serialize, Deserialize)]
-struct CancelAsked {
-    goal_id: GoalId,
-    stamp: Time,
 }
 
 impl<F: Form> Wire<F> {
@@ -585,29 +578,6 @@ fn is_reach(refusal: &Refusal) -> bool {
         | Refusal::TooImprecise { .. }
         | Refusal::Busy
         | Refusal::NotStanding { .. } => false,
-    }
-}
-
-fn cancel_asked(request: &CancelGoalRequest) -> Option<CancelAsked> {
-    let bytes = cdr_encoding::to_vec::<_, byteorder::LittleEndian>(request).ok()?;
-    cdr_encoding::from_bytes::<_, byteorder::LittleEndian>(&bytes).ok().map(|(asked, _)| asked)
-}
-
-fn ros_id(id: &GoalId) -> ros2_client::unique_identifier_msgs::UUID {
-    ros2_client::unique_identifier_msgs::UUID { uuid: uuid::Uuid::from_bytes(*id) }
-}
-
-fn ros_info(goal: &Goal) -> GoalInfo {
-    GoalInfo { goal_id: ros_id(&goal.id), stamp: RosTime::from_nanos(goal.accepted) }
-}
-
-fn ros_state(state: GoalState) -> GoalStatusEnum {
-    match state {
-        GoalState::Executing => GoalStatusEnum::Executing,
-        GoalState::Canceling => GoalStatusEnum::Canceling,
-        GoalState::Succeeded => GoalStatusEnum::Succeeded,
-        GoalState::Canceled => GoalStatusEnum::Canceled,
-        GoalState::Aborted => GoalStatusEnum::Aborted,
     }
 }
 

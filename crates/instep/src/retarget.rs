@@ -285,8 +285,8 @@ impl Retarget {
     }
 }
 
-/// A flag that Ctrl-C raises; a second Ctrl-C ends the program at once.
-fn stopped_by_the_user() -> Arc<AtomicBool> {
+/// A flag that Ctrl-C or a request to terminate raises; a second Ctrl-C ends the program at once.
+pub(crate) fn stopped_by_the_user() -> Arc<AtomicBool> {
     let stop = Arc::new(AtomicBool::new(false));
     let raised = Arc::clone(&stop);
     // Without a handler Ctrl-C ends the program, as it would anyway.

@@ -1,7 +1,7 @@
 //! `instep ros`: the kick as a ROS 2 action, for a real robot or a simulated one, until it is interrupted.
 
 use std::process::ExitCode;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
@@ -13,14 +13,12 @@ use crate::failure::Failure;
 use crate::kick::point;
 use crate::output::Output;
 use crate::places;
+use crate::retarget::stopped_by_the_user;
 
 /// How long a sensor of a real robot may be silent before the foot is brought down, s.
 const PATIENCE: f64 = 0.1;
 /// Physics step while the ball is near, s: coarser than a measurement needs, so that the world keeps up with time.
 const NEAR_STEP: f64 = 0.0005;
-
-/// Set by the first interrupt.
-static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
 /// The arguments of `instep ros`.
 #[derive(Debug, Args)]
@@ -99,7 +97,7 @@ impl Ros {
             Layout::Dynamic => Node::start::<Dynamic>(&subject.robot, engines, &settings, print)?,
             Layout::Of2026 => Node::start::<Form2026>(&subject.robot, engines, &settings, print)?,
         };
-        listen_for_interrupts();
+        let stop = stopped_by_the_user();
         output.remark(|_| {
             let whom = if self.lan { "every network of this machine" } else { "this machine only" };
             let what = if self.simulate { "simulated" } else { "real" };
@@ -115,7 +113,7 @@ impl Ros {
         }
         let start = Instant::now();
         while node.is_running()
-            && !INTERRUPTED.load(Ordering::Relaxed)
+            && !stop.load(Ordering::Relaxed)
             && duration.is_none_or(|duration| start.elapsed() < duration)
         {
             std::thread::sleep(Duration::from_millis(20));
@@ -141,22 +139,6 @@ fn mapping(rmw: Option<String>) -> Result<Mapping, Failure> {
         other => {
             let expected = "expected rmw_fastrtps_cpp or rmw_cyclonedds_cpp (--rmw or RMW_IMPLEMENTATION)";
             Err(Failure::input(format!("{other}: this middleware is not supported; {expected}")))
-        }
-    }
-}
-
-/// From here on the first interrupt or termination asks the node to end; the second ends the program.
-fn listen_for_interrupts() {
-    extern "C" fn interrupted(_: libc::c_int) {
-        INTERRUPTED.store(true, Ordering::Relaxed);
-    }
-    for signal in [libc::SIGINT, libc::SIGTERM] {
-        // SAFETY: the handler stores to an atomic, which a signal handler may; the structure is zeroed, which is valid.
-        unsafe {
-            let mut action: libc::sigaction = std::mem::zeroed();
-            action.sa_sigaction = interrupted as *const () as usize;
-            action.sa_flags = libc::SA_RESETHAND | libc::SA_RESTART;
-            libc::sigaction(signal, &raw const action, std::ptr::null_mut());
         }
     }
 }
