@@ -82,9 +82,9 @@ fn forty_goals_in_a_row_all_end() {
     goals_in_a_row(66, 40);
 }
 
-/// The bar of issue 8. Takes some ten minutes: `cargo test -p instep-ros --test it -- --ignored --nocapture`.
+/// The bar of issue 8. Takes some five minutes: `cargo test -p instep-ros --test it -- --ignored --nocapture`.
 #[test]
-#[ignore = "takes some ten minutes"]
+#[ignore = "takes some five minutes"]
 fn a_thousand_goals_leave_memory_flat() {
     let used = goals_in_a_row(67, 1000);
     // The first tenth warms up caches and allocator.
