@@ -1,7 +1,7 @@
 //! Time and outcome of the kinodynamic stage, by stage: `cargo bench -p instep-retarget --bench kinodynamic -- 10_03`.
 //! Without clips named: all of CMU's subject 10. `--trace` prints every step, `--save FOLDER` keeps the references,
 //! `--rate`, `--time-scale`, `--friction`, `--torque-margin`, `--q_i`, `--q_a`, `--q_j`, `--q_m`, `--q_ball` and
-//! `--robot` change what they say.
+//! `--robot` change what they say; `--slope` is the ground's rise along the kick, `--raise` its height at the ball.
 //! Skips with a message where the clips are not beside the repository.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a benchmark prints, and stops at the first surprise")]
 
@@ -12,7 +12,7 @@ use std::time::Instant;
 use instep_motion::asf;
 use instep_motion::reference::Source;
 use instep_retarget::kinematic::{KinematicSettings, retarget};
-use instep_retarget::kinodynamic::{KinodynamicSettings, Work, optimize};
+use instep_retarget::kinodynamic::{HeightMap, KinodynamicSettings, Work, optimize};
 use instep_robot::Robot;
 
 const ACKNOWLEDGEMENT: &str = "The data used in this project was obtained from mocap.cs.cmu.edu. \
@@ -58,6 +58,13 @@ fn main() {
     number("--q_j", &mut settings.weights.q_j);
     number("--q_m", &mut settings.weights.q_m);
     number("--q_ball", &mut settings.weights.q_ball);
+    let (mut slope, mut raise) = (0.0, 0.0);
+    number("--slope", &mut slope);
+    number("--raise", &mut raise);
+    if slope != 0.0 || raise != 0.0 {
+        let heights = vec![vec![raise - 10.0 * slope], vec![raise + 10.0 * slope]];
+        settings.ground = HeightMap { origin: [-10.0, 0.0], spacing: 20.0, heights };
+    }
     let robot = Robot::load(&root.join("robots").join(after("--robot").unwrap_or("prestoe".into()))).unwrap();
     let named: Vec<&str> = args.iter().map(String::as_str).filter(|a| a.starts_with("10_")).collect();
     let all = ["10_01", "10_02", "10_03", "10_05", "10_06"];
@@ -122,7 +129,7 @@ fn main() {
         let v = &done.verification;
         println!(
             "  (33) at 200 Hz: torque {} speed {} joint {} of {}; root wrench {:.4} m g at {:.3} s; slip {:.2} mm; \
-             penetration {:.2} mm; overlap {:.2} mm; friction {:.1e}",
+             lift {:.2} mm; penetration {:.2} mm; overlap {:.2} mm; friction {:.1e}",
             v.torque_violations,
             v.speed_violations,
             v.joint_violations,
@@ -130,6 +137,7 @@ fn main() {
             v.root_wrench_residual,
             v.root_wrench_time,
             1e3 * v.stance_slip,
+            1e3 * v.stance_lift,
             1e3 * v.penetration,
             1e3 * v.self_collision,
             v.friction

@@ -50,7 +50,7 @@ pub(crate) fn reference(solver: &Solver, start: &Retargeted) -> Reference {
                 }
             }
             if i % 2 == 1 {
-                balance(plan, &dynamics, &mut forces);
+                balance(plan, i / 2, &dynamics, &mut forces);
             }
             let forces: Vec<[f64; 3]> = forces.into_iter().map(|f| rounded(f.into(), FORCE_DIGITS)).collect();
             let torques = generalised(plan, &dynamics, &forces.iter().map(|f| Vector3::from(*f)).collect::<Vec<_>>());
@@ -110,8 +110,9 @@ fn generalised(plan: &Plan, dynamics: &Dynamics, forces: &[Vector3<f64>]) -> Vec
     sums
 }
 
-/// Adds the least change of the forces that push which takes the wrench off the base, or as much of it as can be.
-fn balance(plan: &Plan, dynamics: &Dynamics, forces: &mut [Vector3<f64>]) {
+/// Adds the least change of the forces that push which takes the wrench off the base, or as much of it as can be; after
+/// node `k`.
+fn balance(plan: &Plan, k: usize, dynamics: &Dynamics, forces: &mut [Vector3<f64>]) {
     let wrench = generalised(plan, dynamics, forces);
     let pushing: Vec<usize> = (0..forces.len()).filter(|&p| forces[p].norm() > 0.0).collect();
     if pushing.is_empty() {
@@ -135,9 +136,12 @@ fn balance(plan: &Plan, dynamics: &Dynamics, forces: &mut [Vector3<f64>]) {
         .map(|(w, column)| column.iter().zip(share.iter()).map(|(c, s)| c * *s).sum::<Vector3<f64>>() * *w)
         .collect();
     // As much of it as leaves every force inside the cone.
-    let inside = |f: &Vector3<f64>| f.x.hypot(f.y) <= plan.settings.friction * f.z;
+    let inside = |p: usize, f: Vector3<f64>| {
+        let [x, y, up] = plan.footing(k, p).map(|axis| axis.dot(&f));
+        x.hypot(y) <= plan.settings.friction * up
+    };
     for part in [1.0, 0.5, 0.25] {
-        if pushing.iter().zip(&change).all(|(&p, change)| inside(&(forces[p] + change * part))) {
+        if pushing.iter().zip(&change).all(|(&p, change)| inside(p, forces[p] + change * part)) {
             pushing.iter().zip(&change).for_each(|(&p, change)| forces[p] += change * part);
             return;
         }

@@ -7,7 +7,7 @@
 //! Units: m; for speeds 0.1 m/s.
 
 use instep_robot::Robot;
-use nalgebra::{Rotation3, Vector3};
+use nalgebra::Vector3;
 
 use super::node::View;
 use super::terms::{Family, Sink};
@@ -19,8 +19,7 @@ pub(crate) fn rows(view: &View, sink: &mut Sink) {
     let plan = view.plan;
     for hold in &view.node.holds {
         let contact = &plan.robot.contacts[hold.point];
-        let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), plan.episodes[hold.episode].heading);
-        let direction = turn * hold.direction;
+        let direction = plan.episodes[hold.episode].turn() * hold.direction;
         let at = view.s.dynamics.pose.point(&contact.at);
         let away = (at - plan.place(hold.episode, hold.point)).dot(&direction);
         sink.equal(Family::Contact, away, |row| view.point_row(contact.at.link, &at, &direction, &mut row.q));

@@ -1,6 +1,6 @@
 //! No contact point below the ground (13). Points held by [`super::contact`] are on it; the others keep a clearance.
 //!
-//! The height map is the level pitch at z = 0, as in all of Instep so far. Unit: m.
+//! Unit: m, upwards. See [`super::height_map`].
 
 use nalgebra::Vector3;
 
@@ -18,8 +18,9 @@ pub(crate) fn rows(view: &View, sink: &mut Sink) {
         let near = beside.iter().any(|&n| view.plan.nodes[n].standing[point]);
         let clearance = if near { 0.0 } else { view.plan.settings.ground_clearance };
         let at = view.s.dynamics.pose.point(&contact.at);
-        sink.at_most(Family::Ground, contact.radius + clearance - at.z, |row| {
-            view.point_row(contact.at.link, &at, &-Vector3::z(), &mut row.q);
+        let (rest, slope) = view.plan.settings.ground.rest(at.x, at.y, contact.radius);
+        sink.at_most(Family::Ground, rest + clearance - at.z, |row| {
+            view.point_row(contact.at.link, &at, &Vector3::new(slope.x, slope.y, -1.0), &mut row.q);
         });
     }
 }

@@ -31,8 +31,8 @@
 //! | (3) | [`tracking`] | keypoints and posture |
 //! | (4) (5) | [`strike`] | foot speed in the swing |
 //! | (6) | [`regularisation`] | speeds, angular momentum, forces |
-//! | (9) (11) (12) | [`contact`] | independent rows |
-//! | (10) | [`friction`] | four rays |
+//! | (9) (11) (12) | [`contact`] | independent rows; gamma_gnd in [`height_map`] |
+//! | (10) | [`friction`] | four rays about the ground's normal |
 //! | (13) | [`ground`] | |
 //! | (14) | [`collision`] | capsules |
 //! | (15) (18) | [`torque`] | with the torque-speed law of the drives |
@@ -42,7 +42,11 @@
 //! | (21)-(24) | [`transcription`] | exact |
 //! | (33) | [`verify`] | MuJoCo, at 200 Hz |
 //!
-//! Not done: the impact with the ball; ground that is not level; sums over several clips.
+//! The ground is a height map ([`HeightMap`]); the kinematic stage before knows level ground only, so the motion is raised
+//! onto the map and starts with its feet level. The map is not in the reference, and who plays a reference on a level
+//! pitch should have made it for one.
+//!
+//! Not done: the impact with the ball; a foot that stands across an edge of the ground; sums over several clips.
 
 mod ankle_lock;
 mod approach;
@@ -52,6 +56,7 @@ mod collision;
 mod contact;
 mod friction;
 mod ground;
+mod height_map;
 mod inverse_dynamics;
 mod limits;
 mod local;
@@ -86,6 +91,7 @@ use terms::Family;
 use transcription::Unknowns;
 use verify::{VERIFY_RATE, Verification, verify};
 
+pub use height_map::HeightMap;
 pub use settings::{KinodynamicSettings, KinodynamicWeights};
 
 /// What the stage is at.
@@ -296,7 +302,7 @@ fn solve(
         family,
     });
     let mut reference = assemble::reference(&solver, start);
-    let verification = verify(robot, &reference, VERIFY_RATE, settings.friction);
+    let verification = verify(robot, &reference, VERIFY_RATE, settings.friction, &settings.ground);
     let status = status(&mut solver, end, &violations, &verification);
     if !status.feasible() {
         reference.kind = ReferenceKind::Infeasible;

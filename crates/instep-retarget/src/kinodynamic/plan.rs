@@ -5,6 +5,7 @@ use instep_robot::{LinkPoint, Robot};
 use nalgebra::{Rotation3, Vector3};
 
 use super::collision::Capsules;
+use super::height_map;
 use super::settings::KinodynamicSettings;
 use super::tree::{MAX_PITCH, Tree};
 use crate::RetargetError;
@@ -51,6 +52,15 @@ pub(crate) struct Episode {
     /// Of the sole's origin on the ground, m.
     pub place: Vector3<f64>,
     pub heading: f64,
+    /// Lays level axes on the ground under the foot.
+    pub tilt: Rotation3<f64>,
+}
+
+impl Episode {
+    /// `world_from_sole`.
+    pub(crate) fn turn(&self) -> Rotation3<f64> {
+        self.tilt * Rotation3::from_axis_angle(&Vector3::z_axis(), self.heading)
+    }
 }
 
 /// The whole problem but its unknowns.
@@ -127,7 +137,9 @@ impl<'a> Plan<'a> {
         let node_at = |t: f64| ((t / step).round().max(0.0) as usize).min(count - 1);
         let lock = [node_at(phases.t_lock), impact];
 
-        let ball = Vector3::from(start.reference.ball);
+        let level = Vector3::from(start.reference.ball);
+        let ground = &settings.ground;
+        let ball = Vector3::new(level.x, level.y, ground.rest(level.x, level.y, level.z).0);
         let shift = Vector3::new(settings.ball[0], settings.ball[1], 0.0);
         let aim_turn = aim_turn(start, &(ball + shift), settings);
         // The world's x axis is the aim; where that is not the clip's own direction, the clip is turned instead.
@@ -152,7 +164,10 @@ impl<'a> Plan<'a> {
                 });
             }
             posture.iter_mut().zip(&next).for_each(|(x, y)| *x += share.max(0.0) * (y - *x));
-            let moved = |at: Vector3<f64>| ball + turn * (at - shift - ball);
+            let moved = |at: Vector3<f64>| {
+                let at = level + turn * (at - shift - level);
+                at + Vector3::z() * ground.height(at.x, at.y)
+            };
             if k == impact {
                 at_impact.clone_from(&posture);
             }
@@ -181,7 +196,7 @@ impl<'a> Plan<'a> {
         });
         let mut pose = tree.pose();
         tree.place(&at_impact, &mut pose);
-        let strike_place = pose.point(&strike);
+        let strike_place = pose.point(&strike) + (ball - level);
         let weight = tree.mass * tree.gravity;
         let keypoints = keypoints(&start.targets, weights);
         let capsules = Capsules::new(robot, &data);
@@ -224,7 +239,8 @@ impl<'a> Plan<'a> {
                     (None, true) => start = Some(k),
                     (Some(first), false) => {
                         let place = Vector3::zeros();
-                        self.episodes.push(Episode { side, start: first, end: k, place, heading: 0.0 });
+                        let tilt = Rotation3::identity();
+                        self.episodes.push(Episode { side, start: first, end: k, place, heading: 0.0, tilt });
                         start = None;
                     }
                     _ => {}
@@ -276,7 +292,8 @@ impl<'a> Plan<'a> {
         }
     }
 
-    /// Puts every episode's foot where its standing points are on average, flat on the ground.
+    /// Puts every episode's foot where its standing points are on average, flat on the ground. Where the ground under it
+    /// is no plane, the foot takes its mean slope and its points touch or are above it.
     pub(crate) fn settle(&mut self, positions: &[Vec<f64>]) {
         let mut pose = self.tree.pose();
         for e in 0..self.episodes.len() {
@@ -307,17 +324,35 @@ impl<'a> Plan<'a> {
                 let ahead = pose.rotations[self.robot.leg(side).foot] * Vector3::x();
                 ahead.y.atan2(ahead.x)
             };
-            let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), heading);
+            let ground = &self.settings.ground;
+            let slopes = pairs.iter().map(|(_, at, _)| ground.gradient(at.x, at.y) / count);
+            let tilt = height_map::tilt(&slopes.sum());
+            let episode = &mut self.episodes[e];
+            (episode.heading, episode.tilt) = (heading, tilt);
+            let turn = episode.turn();
             let place = mean.1 - turn * mean.0;
-            self.episodes[e].place = Vector3::new(place.x, place.y, 0.0);
-            self.episodes[e].heading = heading;
+            // Up until no standing point is in the ground.
+            let depth = pairs.iter().map(|(offset, ..)| {
+                let at = Vector3::new(place.x, place.y, 0.0) + turn * Vector3::new(offset.x, offset.y, 0.0);
+                ground.height(at.x, at.y) - at.z
+            });
+            let up = depth.reduce(f64::max).unwrap_or(0.0);
+            episode.place = Vector3::new(place.x, place.y, up);
         }
     }
 
     /// Where a contact point stands during an episode, m.
     pub(crate) fn place(&self, episode: usize, point: usize) -> Vector3<f64> {
         let e = &self.episodes[episode];
-        e.place + Rotation3::from_axis_angle(&Vector3::z_axis(), e.heading) * self.offsets[point]
+        e.place + e.turn() * self.offsets[point]
+    }
+
+    /// Axes of the ground under a point that stands at node `k`: x, y and straight off it.
+    pub(crate) fn footing(&self, k: usize, point: usize) -> [Vector3<f64>; 3] {
+        let side = self.robot.contacts[point].leg;
+        let stands = self.episodes.iter().find(|e| e.side == side && (e.start..e.end).contains(&k));
+        let tilt = stands.map_or_else(Rotation3::identity, |e| e.tilt);
+        [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| tilt * axis)
     }
 }
 

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::height_map::HeightMap;
 use crate::RetargetError;
 
 /// Weights of the costs (3), (4) and (6); each is summed over the nodes and multiplied by the time between them, so
@@ -76,6 +77,9 @@ pub struct KinodynamicSettings {
     pub min_gap: f64,
     /// Coefficient of friction of the cone (10), 0.1 to 2. The cone is the pyramid inside of it.
     pub friction: f64,
+    /// The ground's height, gamma_gnd of (12) and (13). The kinematic stage knows level ground only: what it hands over is
+    /// raised, each point by the height of the ground below it, and the ball by that below the ball.
+    pub ground: HeightMap,
     /// Least and greatest approach angle of (20), rad.
     pub approach_angle: [f64; 2],
     /// Foot speed along x that is asked for at the impact, m/s; none asks for as much as Q_i is worth.
@@ -111,6 +115,7 @@ impl Default for KinodynamicSettings {
             weights: KinodynamicWeights::default(),
             min_gap: 0.075,
             friction: 0.6,
+            ground: HeightMap::default(),
             approach_angle: [24.0_f64.to_radians(), 43.0_f64.to_radians()],
             foot_speed: None,
             torque_margin: 0.08,
@@ -176,6 +181,7 @@ impl KinodynamicSettings {
                 });
             }
         }
+        self.ground.validate("kinodynamic.ground")?;
         if self.iterations == 0 || self.rounds == 0 {
             return Err(RetargetError::Setting {
                 field: "kinodynamic.iterations, kinodynamic.rounds".into(),

@@ -200,6 +200,7 @@ fn gradients_of_all_rows_are_differences() {
         let settings = KinodynamicSettings { foot_speed: Some(9.0), rate: 120.0, ..KinodynamicSettings::default() };
         let mut settings = settings;
         settings.weights.q_i = [0.3, 0.2, 0.1];
+        settings.ground = slope();
         let plan = Plan::new(&robot, &start, &Weights::default(), &settings).unwrap();
         let nv = robot.nv();
         let mut scratch = Scratch::new(&plan);
@@ -264,6 +265,11 @@ fn gradients_of_all_rows_are_differences() {
     }
 }
 
+/// Ground that rises by 5 % along x and by 3 % along y.
+fn slope() -> super::HeightMap {
+    super::HeightMap { origin: [-5.0; 2], spacing: 10.0, heights: vec![vec![-0.4, -0.1], vec![0.1, 0.4]] }
+}
+
 /// A robot that keeps its standing pose, both feet on the ground.
 fn standing(robot: &Robot) -> crate::kinematic::Retargeted {
     let mut start = started(robot);
@@ -281,7 +287,16 @@ fn standing(robot: &Robot) -> crate::kinematic::Retargeted {
 }
 
 fn solve(robot: &Robot, start: &crate::kinematic::Retargeted, stopped: bool) -> super::Kinodynamic {
-    let settings = super::KinodynamicSettings { rate: 60.0, ..Default::default() };
+    solve_on(robot, start, super::HeightMap::default(), stopped)
+}
+
+fn solve_on(
+    robot: &Robot,
+    start: &crate::kinematic::Retargeted,
+    ground: super::HeightMap,
+    stopped: bool,
+) -> super::Kinodynamic {
+    let settings = super::KinodynamicSettings { rate: 60.0, ground, ..Default::default() };
     let mut settings = settings;
     settings.weights.q_i = [0.0; 3];
     let stop = std::sync::atomic::AtomicBool::new(stopped);
@@ -302,6 +317,74 @@ fn standing_still_is_carried_by_the_weight() {
     assert!(done.verification.root_wrench_residual < 0.01);
     assert_eq!(done.verification.torque_violations, 0);
     assert_eq!(done, solve(robot, &start, false), "the same again");
+}
+
+/// A map of zeros is no map, to the last bit; a plane 5 cm higher gives the same motion 5 cm higher, ball and all.
+#[test]
+fn a_level_plane_only_raises_the_motion() {
+    let robot = &robots()[0];
+    let start = standing(robot);
+    let plain = solve(robot, &start, false);
+    let zeros = super::HeightMap { origin: [-1.1, 0.2], spacing: 0.7, heights: vec![vec![0.0; 3]; 4] };
+    assert_eq!(plain, solve_on(robot, &start, zeros, false));
+    let plane = super::HeightMap { heights: vec![vec![0.05]], ..Default::default() };
+    let raised = solve_on(robot, &start, plane, false);
+    assert_eq!(raised.status, super::Status::Solved, "{:?}", raised.violations);
+    assert!((raised.reference.ball[2] - plain.reference.ball[2] - 0.05).abs() < 1e-12);
+    for (k, (low, high)) in plain.reference.knots.iter().zip(&raised.reference.knots).enumerate() {
+        for (axis, by) in [0.0, 0.0, 0.05].into_iter().enumerate() {
+            let miss = high.base_position[axis] - low.base_position[axis] - by;
+            assert!(miss.abs() < 1e-6, "knot {k}, axis {axis}: {miss}");
+        }
+        let joints = low.joints.iter().zip(&high.joints).all(|(a, b)| (a - b).abs() < 1e-5);
+        assert!(joints, "knot {k}: {:?} {:?}", low.joints, high.joints);
+    }
+}
+
+/// On a slope feet stand on the plane and the cone's axis is its normal; the weight is carried as on level ground.
+#[test]
+fn a_robot_stands_on_a_slope() {
+    let robot = &robots()[0];
+    let start = standing(robot);
+    let settings = super::KinodynamicSettings { ground: slope(), ..Default::default() };
+    let plan = super::plan::Plan::new(robot, &start, &crate::kinematic::Weights::default(), &settings).unwrap();
+    let normal = nalgebra::Vector3::new(-0.05, -0.03, 1.0).normalize();
+    for (e, episode) in plan.episodes.iter().enumerate() {
+        for (p, contact) in robot.contacts.iter().enumerate().filter(|(_, c)| c.leg == episode.side) {
+            let at = plan.place(e, p);
+            assert!((at.dot(&normal) - contact.radius).abs() < 1e-9, "{}: {at}", contact.name);
+            assert!((plan.footing(5, p)[2] - normal).norm() < 1e-9);
+        }
+    }
+    let done = solve_on(robot, &start, slope(), false);
+    assert_eq!(done.status, super::Status::Solved, "{:?} {:?}", done.violations, done.verification);
+    let middle = &done.reference.knots[done.reference.knots.len() / 2];
+    let weight = robot.mass() * 9.81;
+    let sum: f64 = middle.forces.iter().map(|f| f[2]).sum();
+    assert!((sum / weight - 1.0).abs() < 0.02, "{sum} N of {weight} N");
+    // The same motion on level ground: its standing points are in the ground or above it.
+    let level = super::verify::verify(robot, &done.reference, 200.0, 0.6, &super::HeightMap::default());
+    assert!(level.fault().is_some());
+}
+
+/// The left foot on a step 3 cm high, the right one beside it.
+#[test]
+fn a_robot_stands_on_a_step() {
+    let robot = &robots()[0];
+    let start = standing(robot);
+    // The robot stands at y = 0.55.
+    let step = super::HeightMap { origin: [0.0, 0.49], spacing: 0.04, heights: vec![vec![0.0, 0.0, 0.03, 0.03]] };
+    let done = solve_on(robot, &start, step, false);
+    assert_eq!(done.status, super::Status::Solved, "{:?} {:?}", done.violations, done.verification);
+    let knot = &done.reference.knots[done.reference.knots.len() / 2];
+    let q = [&knot.base_position[..], &knot.base_orientation, &knot.joints].concat();
+    let mut data = robot.data();
+    data.set_position(&q);
+    for contact in &robot.contacts {
+        let height = if contact.leg == instep_motion::phase::Side::Left { 0.03 } else { 0.0 };
+        let at = data.point(&contact.at);
+        assert!((at.z - contact.radius - height).abs() < 1e-3, "{}: {at}", contact.name);
+    }
 }
 
 /// What is not a number is refused at the door.

@@ -13,13 +13,15 @@ use instep_robot::{LinkPoint, Robot};
 use nalgebra::Vector3;
 use serde::Serialize;
 
+use super::height_map::HeightMap;
+
 /// Half the time over which speeds are differenced, s.
 pub const DIFFERENCE: f64 = 1e-5;
 /// Instants a second at which [`super::optimize`] checks, at least.
 pub const VERIFY_RATE: f64 = 200.0;
 /// Largest wrench on the base that a motion may leave over, as a share of m g.
 pub const MAX_ROOT_WRENCH: f64 = 0.01;
-/// Longest way of a standing point, m.
+/// Longest way of a standing point along the ground, and off it, m.
 pub const MAX_SLIP: f64 = 1e-3;
 /// Deepest point below the ground and deepest overlap of capsules, m; largest force outside its cone, share of m g.
 pub const MAX_DEPTH: f64 = 1e-4;
@@ -45,6 +47,8 @@ pub struct Verification {
     pub root_wrench_time: f64,
     /// Longest way along the ground of a point during one stance, m.
     pub stance_slip: f64,
+    /// Greatest height of a standing point above the ground, m.
+    pub stance_lift: f64,
     /// Deepest point below the ground, m.
     pub penetration: f64,
     /// Deepest overlap of capsules, m.
@@ -74,6 +78,7 @@ impl Verification {
         let measured = [
             ("root_wrench_residual", self.root_wrench_residual, MAX_ROOT_WRENCH),
             ("stance_slip", self.stance_slip, MAX_SLIP),
+            ("stance_lift", self.stance_lift, MAX_SLIP),
             ("penetration", self.penetration, MAX_DEPTH),
             ("self_collision", self.self_collision, MAX_DEPTH),
             ("friction", self.friction, MAX_DEPTH),
@@ -86,9 +91,10 @@ impl Verification {
     }
 }
 
-/// Checks `reference` at `rate` instants a second, at least; `friction` is the coefficient of the cone.
+/// Checks `reference` at `rate` instants a second, at least; `friction` is the coefficient of the cone. The cone's axis
+/// is the normal of the `ground`.
 #[must_use]
-pub fn verify(robot: &Robot, reference: &Reference, rate: f64, friction: f64) -> Verification {
+pub fn verify(robot: &Robot, reference: &Reference, rate: f64, friction: f64, ground: &HeightMap) -> Verification {
     let mut data = robot.data();
     let nv = robot.nv();
     let weight = robot.mass() * 9.81;
@@ -137,20 +143,25 @@ pub fn verify(robot: &Robot, reference: &Reference, rate: f64, friction: f64) ->
         }
         // A point stands between two knots when it does at both.
         let next = (t * reference.rate).ceil() as usize;
-        let slope = friction;
         for (p, contact) in robot.contacts.iter().enumerate() {
             let at = data.point(&contact.at);
-            found.penetration = found.penetration.max(contact.radius - at.z);
+            let depth = ground.rest(at.x, at.y, contact.radius).0 - at.z;
+            let normal = ground.normal(at.x, at.y);
+            found.penetration = found.penetration.max(depth);
             let stands = knot.contacts[p] && reference.knots.get(next).is_some_and(|k| k.contacts[p]);
             if stands {
                 let anchor = anchors[p].get_or_insert(at);
-                found.stance_slip = found.stance_slip.max((at - *anchor).xy().norm());
+                let moved = at - *anchor;
+                found.stance_slip = found.stance_slip.max((moved - normal * moved.dot(&normal)).norm());
+                found.stance_lift = found.stance_lift.max(-depth);
             } else {
                 anchors[p] = None;
             }
-            if let Some(&[x, y, z]) = knot.forces.get(p) {
-                let outside = (x.hypot(y) - slope * z).max(-z);
-                let loose = if stands { 0.0 } else { x.hypot(y).max(z.abs()) };
+            if let Some(force) = knot.forces.get(p).copied().map(Vector3::from) {
+                let up = force.dot(&normal);
+                let across = (force - normal * up).norm();
+                let outside = (across - friction * up).max(-up);
+                let loose = if stands { 0.0 } else { across.max(up.abs()) };
                 found.friction = found.friction.max(outside.max(loose) / weight);
             }
         }
