@@ -122,8 +122,8 @@ struct Done {
     retargeted: Retargeted,
     /// Where the command went that far.
     kinodynamic: Option<Kinodynamic>,
-    /// Of the cone.
-    friction: f64,
+    /// Of the kinodynamic stage.
+    limits: KinodynamicSettings,
     /// Time that each stage took, s.
     seconds: BTreeMap<&'static str, f64>,
     reference: PathBuf,
@@ -162,8 +162,8 @@ impl Retarget {
             }
         };
         let seconds = line.finish();
-        let (clip_file, form, friction) = (self.clip, self.form, limits.friction);
-        let done = Done { robot, clip, clip_file, form, retargeted, kinodynamic, friction, seconds, reference, report };
+        let (clip_file, form) = (self.clip, self.form);
+        let done = Done { robot, clip, clip_file, form, retargeted, kinodynamic, limits, seconds, reference, report };
         done.write()?;
         output.show(&Measures::new(&done), |paint| done.text(paint))?;
         Ok(done.code())

@@ -156,8 +156,8 @@ fn items(k: &Kinodynamic) -> Vec<SummaryItem> {
         SummaryItem::new(
             "Stance slip",
             format!("{:.2} mm", v.stance_slip * 1e3),
-            judged(v.stance_slip <= MAX_SLIP),
-            format!("deepest point {:.2} mm", v.penetration * 1e3),
+            judged(v.stance_slip <= MAX_SLIP && v.stance_lift <= MAX_SLIP),
+            format!("lift {:.2} mm, deepest point {:.2} mm", v.stance_lift * 1e3, v.penetration * 1e3),
         ),
         SummaryItem::new(
             "Worst violation",
@@ -314,30 +314,46 @@ fn link_speeds<'a>(done: &'a Done, shown: &Shown, data: &mut RobotData) -> Vec<(
     speeds
 }
 
+/// The steepest of a foot's contact forces as a share of its cone about the ground's normal, %. A foot without a loaded
+/// point has no share: NaN, a gap in the line.
+fn cone_shares(done: &Done, shown: &Shown, side: Side, data: &mut RobotData) -> Vec<f64> {
+    let robot = &done.robot;
+    let loaded = LOADED * robot.mass() * 9.81;
+    let steepest = |(knot, (q, _)): (&&Knot, &(Vec<f64>, Vec<f64>))| {
+        data.set_position(q);
+        let own = robot.contacts.iter().zip(&knot.forces).filter(|(contact, _)| contact.leg == side);
+        let shares = own.map(|(contact, force)| {
+            let (at, force) = (data.point(&contact.at), Vector3::from(*force));
+            let normal = done.limits.ground.normal(at.x, at.y);
+            let up = force.dot(&normal);
+            let across = (force - normal * up).norm();
+            if up > loaded { across / (done.limits.friction * up) * 100.0 } else { f64::NAN }
+        });
+        shares.fold(f64::NAN, f64::max)
+    };
+    shown.knots.iter().zip(&shown.states).map(steepest).collect()
+}
+
 fn plots(done: &Done, shown: &Shown, speeds: &[(&str, Vec<f64>)], data: &mut RobotData) -> Vec<Plot> {
     let robot = &done.robot;
     let weight = robot.mass() * 9.81;
     let lines = speeds.iter().map(|(name, speeds)| Series::shared(*name, speeds.clone())).collect();
     let mut plots = vec![shown.plot("Forward speed, pelvis to toe", "m/s", lines, &[])];
-    let of_side = |side: Side, each: &dyn Fn(&[f64; 3]) -> f64, join: fn(f64, f64) -> f64, first: f64| {
-        let value = |knot: &&Knot| {
-            let forces = robot.contacts.iter().zip(&knot.forces).filter(|(contact, _)| contact.leg == side);
-            forces.map(|(_, force)| each(force)).fold(first, join)
+    let vertical = |side: Side| {
+        let forces = |knot: &&Knot| {
+            robot.contacts.iter().zip(&knot.forces).filter(|(c, _)| c.leg == side).map(|(_, f)| f[2]).sum()
         };
-        shown.knots.iter().map(value).collect::<Vec<f64>>()
+        shown.knots.iter().map(forces).collect::<Vec<f64>>()
     };
-    let both = |each: &dyn Fn(&[f64; 3]) -> f64, join: fn(f64, f64) -> f64, first: f64| {
+    let both = |[left, right]: [Vec<f64>; 2]| {
         vec![
-            Series::shared("left foot", of_side(Side::Left, each, join, first)).colored(Color::GREEN),
-            Series::shared("right foot", of_side(Side::Right, each, join, first)).colored(Color::VIOLET),
+            Series::shared("left foot", left).colored(Color::GREEN),
+            Series::shared("right foot", right).colored(Color::VIOLET),
         ]
     };
-    plots.push(shown.plot("Ground force, vertical", "N", both(&|f| f[2], |a, b| a + b, 0.0), &[("weight", weight)]));
-    // A foot without a loaded point has no share: NaN, a gap in the line.
-    let share = |f: &[f64; 3]| {
-        if f[2] > LOADED * weight { f[0].hypot(f[1]) / (done.friction * f[2]) * 100.0 } else { f64::NAN }
-    };
-    let most = both(&share, f64::max, f64::NAN);
+    let sums = both([Side::Left, Side::Right].map(vertical));
+    plots.push(shown.plot("Ground force, vertical", "N", sums, &[("weight", weight)]));
+    let most = both([Side::Left, Side::Right].map(|side| cone_shares(done, shown, side, data)));
     plots.push(shown.plot("Forces in their cones, the steepest point", "% of the cone", most, &[("cone", 100.0)]));
     let momentum = |axes: [(&str, usize); 3]| {
         let line = |(name, axis): (&str, usize)| {

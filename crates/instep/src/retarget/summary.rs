@@ -201,8 +201,8 @@ impl Done {
             (format!("wrench on the base {:.2} % of m g", v.root_wrench_residual * 100.0), {
                 v.root_wrench_residual <= instep_retarget::kinodynamic::verify::MAX_ROOT_WRENCH
             }),
-            (format!("stance slip {:.2} mm", v.stance_slip * 1e3), {
-                v.stance_slip <= instep_retarget::kinodynamic::verify::MAX_SLIP
+            (format!("stance slip {:.2} mm, lift {:.2} mm", v.stance_slip * 1e3, v.stance_lift * 1e3), {
+                v.stance_slip.max(v.stance_lift) <= instep_retarget::kinodynamic::verify::MAX_SLIP
             }),
         ];
         for (text, good) in checks {

@@ -198,6 +198,10 @@ fn settings_of_retargeting_that_cannot_be() {
     refused(folder, &arguments, &["settings.toml", "kinodynamic.friction", "-1", "0.1 to 2"]);
     write("[kinodynamic.weights]\nq_m = nan\n");
     refused(folder, &arguments, &["settings.toml", "kinodynamic.weights.q_m", "NaN"]);
+    write("[kinodynamic.ground]\nspacing = 0.1\nheights = [[0.0, 0.05], [0.0]]\n");
+    refused(folder, &arguments, &["settings.toml", "kinodynamic.ground.heights[1]", "1 heights", "expected 2"]);
+    write("[kinodynamic.ground]\nheight = 0.05\n");
+    refused(folder, &arguments, &["settings.toml", "height", "heights"]);
     for (option, value, right) in [
         ("--time-scale", "9", "0.5 to 4"),
         ("--time-scale", "nan", "NaN"),
@@ -224,4 +228,25 @@ fn a_clip_without_a_kick() {
         format!("{}\n{}", header.join("\n"), frames.collect::<String>())
     });
     refused(folder.path(), &WHOLE, &["kick_01.amc", "no kick", "rescaling"]);
+}
+
+/// Somebody who rises by 2 m/s from the plant on: the foot beside the ball does not stand.
+#[test]
+fn a_clip_without_a_stance() {
+    let folder = workspace();
+    edit(folder.path().join("kick_01.amc"), |text| {
+        let mut frame = 0.0_f64;
+        let raised = text.lines().map(|line| {
+            let Some(root) = line.strip_prefix("root ") else { return format!("{line}\n") };
+            frame += 1.0;
+            let mut values: Vec<f64> = root.split(' ').map(|value| value.parse().unwrap()).collect();
+            // Up is the third; units of an inch over 0.45, 60 frames a second.
+            values[2] += (frame - 9.0).max(0.0) * 2.0 / 60.0 * 0.45 / 0.0254;
+            let values: Vec<String> = values.iter().map(f64::to_string).collect();
+            format!("root {}\n", values.join(" "))
+        });
+        raised.collect()
+    });
+    let arguments = [&WHOLE[..], &["--clip-rate", "60"]].concat();
+    refused(folder.path(), &arguments, &["kick_01.amc", "no stance", "left foot", "rescaling"]);
 }
