@@ -387,6 +387,19 @@ fn a_robot_stands_on_a_step() {
     }
 }
 
+/// A foot across the edge of a step stands on nothing that the map knows as a plane: said, not passed over.
+#[test]
+fn a_foot_across_an_edge_does_not_stand() {
+    let robot = &robots()[0];
+    let start = standing(robot);
+    let ankle = robot.data().point(&robot.leg(instep_motion::phase::Side::Left).sole);
+    let middle = 0.55 + ankle.y;
+    let step = super::HeightMap { origin: [0.0, middle - 0.01], spacing: 0.02, heights: vec![vec![0.0, 0.03]] };
+    let done = solve_on(robot, &start, step, false);
+    assert!(!done.status.feasible(), "{:?}", done.verification);
+    assert!(done.verification.stance_lift > super::verify::MAX_SLIP, "{:?}", done.verification);
+}
+
 /// What is not a number is refused at the door.
 #[test]
 fn nothing_that_is_not_a_number_comes_in() {
