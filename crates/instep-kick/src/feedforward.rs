@@ -6,12 +6,32 @@
 //! friction cones, and what the feet cannot give the base is left out. So this is a guess that helps the drives carry
 //! the robot's weight, not a feasible plan: that is the kinodynamic stage's work.
 
-use instep_motion::reference::Knot;
+use instep_motion::reference::{Knot, Reference};
 use instep_robot::Robot;
 use nalgebra::{DMatrix, DVector, Vector3};
 
 /// Regularisation of the ground forces, relative to the unit matrix of the base's six equations.
 const REGULARISATION: f64 = 1e-3;
+
+/// Torques of `reference`'s knots in the robot's joint order, whose joints are at `places` in the reference: its own where it
+/// carries them, else those of [`torques`].
+#[must_use]
+pub fn of_reference(robot: &Robot, reference: &Reference, places: &[usize]) -> Vec<Vec<f64>> {
+    if reference.knots.iter().all(|knot| knot.torques.len() == reference.joint_names.len()) {
+        return reference.knots.iter().map(|knot| places.iter().map(|&place| knot.torques[place]).collect()).collect();
+    }
+    let states: Vec<_> = reference.knots.iter().map(|knot| state(knot, places)).collect();
+    torques(robot, &reference.knots, &states, reference.rate)
+}
+
+/// q (7 + n) and v (6 + n) of a knot, with the robot's joints at `places` in it.
+pub(crate) fn state(knot: &Knot, places: &[usize]) -> (Vec<f64>, Vec<f64>) {
+    let mut q = [&knot.base_position[..], &knot.base_orientation].concat();
+    let mut v = [&knot.base_velocity[..], &knot.base_angular_velocity].concat();
+    q.extend(places.iter().map(|&place| knot.joints[place]));
+    v.extend(places.iter().map(|&place| knot.joint_velocities[place]));
+    (q, v)
+}
 
 /// Joint torques (N m, the robot's joint order) for every knot of a motion with `rate` knots a second; `states` holds
 /// each knot's q (7 + n) and v (6 + n) in the robot's order.

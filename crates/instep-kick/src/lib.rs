@@ -5,6 +5,7 @@
 //! - [`dynamic`]: paper 2's engine: splines of foot and trunk in the support foot's frame, stabilised by the centre of
 //!   pressure.
 //! - [`playback`]: plays a reference from a given instant, open loop; [`feedforward`]: the torques that it needs.
+//! - [`policy`]: paper 1's engine: a network that was trained to follow a reference, and its state estimate.
 //! - [`tree`] and [`ik`]: kinematics without MuJoCo, and inverse kinematics with weighted goals under joint limits.
 //!
 //! An engine sees sensors, never the simulator's truth, and allocates nothing in a tick.
@@ -16,6 +17,7 @@ mod error;
 pub mod feedforward;
 pub mod ik;
 pub mod playback;
+pub mod policy;
 pub mod request;
 pub mod tree;
 

@@ -46,12 +46,7 @@ impl Playback {
                     .ok_or_else(|| KickError::MissingJoint { joint: joint.name.clone(), robot: robot.name.clone() })
             })
             .collect::<Result<_, _>>()?;
-        let torques = if reference.knots.iter().all(|knot| knot.torques.len() == reference.joint_names.len()) {
-            reference.knots.iter().map(|knot| places.iter().map(|&place| knot.torques[place]).collect()).collect()
-        } else {
-            let states: Vec<_> = reference.knots.iter().map(|knot| state(knot, &places)).collect();
-            feedforward::torques(robot, &reference.knots, &states, reference.rate)
-        };
+        let torques = feedforward::of_reference(robot, &reference, &places);
         let mut knot = Knot::default();
         reference.sample_into(start, &mut knot);
         Ok(Self { reference, places, start, knot, torques })
@@ -71,17 +66,8 @@ impl Playback {
     pub fn initial_state(&self) -> (Vec<f64>, Vec<f64>) {
         let mut knot = Knot::default();
         self.reference.sample_into(self.start, &mut knot);
-        state(&knot, &self.places)
+        feedforward::state(&knot, &self.places)
     }
-}
-
-/// q (7 + n) and v (6 + n) of a knot, with the robot's joints at `places` in it.
-fn state(knot: &Knot, places: &[usize]) -> (Vec<f64>, Vec<f64>) {
-    let mut q = [&knot.base_position[..], &knot.base_orientation].concat();
-    let mut v = [&knot.base_velocity[..], &knot.base_angular_velocity].concat();
-    q.extend(places.iter().map(|&place| knot.joints[place]));
-    v.extend(places.iter().map(|&place| knot.joint_velocities[place]));
-    (q, v)
 }
 
 impl Controller for Playback {

@@ -205,7 +205,7 @@ pub fn run_disturbed(
     let mut command = JointCommand::zeros(robot.joints.len());
     let mut watch = ImpactWatch::new();
     let mut log = RerunLog::new();
-    let mut fall = FallWatch::new(&robot);
+    let mut fall = FallWatch::default();
     let mut record = Record::default();
     record.push(world);
     for step in 0..steps {
@@ -317,26 +317,29 @@ impl RerunLog {
 }
 
 /// Watches for a fall: the body on the ground, the base too low or tilted too far.
+#[derive(Default)]
 struct FallWatch {
-    lowest: f64,
     fell_at: Option<f64>,
 }
 
 impl FallWatch {
-    fn new(robot: &Robot) -> Self {
-        Self { lowest: FALLEN_HEIGHT * robot.stand[2], fell_at: None }
-    }
-
     fn look(&mut self, world: &World) {
         if self.fell_at.is_some() {
             return;
         }
-        let up = orientation(world.q()) * Vector3::z();
-        let tilt = up.z.clamp(-1.0, 1.0).acos();
-        if world.q()[2] < self.lowest || tilt > FALLEN_TILT || world.body_touches_ground() {
+        if has_fallen(world) {
             self.fell_at = Some(world.time());
         }
     }
+}
+
+/// Whether the robot lies: its body on the ground, the base lower than half its standing height or tilted beyond 60 degrees.
+#[must_use]
+pub fn has_fallen(world: &World) -> bool {
+    let up = orientation(world.q()) * Vector3::z();
+    let tilt = up.z.clamp(-1.0, 1.0).acos();
+    let lowest = FALLEN_HEIGHT * world.robot().stand[2];
+    world.q()[2] < lowest || tilt > FALLEN_TILT || world.body_touches_ground()
 }
 
 impl Record {

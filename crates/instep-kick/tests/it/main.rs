@@ -5,5 +5,6 @@ mod allocation;
 mod cancel;
 mod issue_304;
 mod kinematics;
+mod policy;
 mod refusals;
 mod rig;
