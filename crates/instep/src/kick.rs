@@ -11,8 +11,10 @@ use std::sync::Arc;
 
 use clap::Args;
 use instep_kick::Playback;
+use instep_kick::policy::PolicyKick;
 use instep_motion::reference::{Reference, ReferenceKind};
 use instep_robot::Robot;
+use instep_robot::control::Controller;
 use instep_sim::BallState;
 use instep_sim::settings::WorldSettings;
 use instep_sim::trial::{self, Trial, TrialSettings};
@@ -30,16 +32,19 @@ const LONGEST: f64 = 120.0;
 /// The arguments of `instep kick`.
 #[derive(Debug, Args)]
 pub(crate) struct Kick {
-    /// The motion to play: a file that `instep retarget` wrote
+    /// The motion to play open loop: a file that `instep retarget` wrote
     #[arg(long, value_name = "FILE", default_value = "references/prestoe/10_03_kinematic.json")]
     reference: PathBuf,
+    /// The policy to run in place of playing a reference: a file that `instep train` wrote
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["reference", "engine"])]
+    policy: Option<PathBuf>,
     /// The robot: a name, or the path of its folder or robot.toml [default: the reference's]
     #[arg(long, value_name = "ROBOT")]
     robot: Option<String>,
     /// Where the ball lies, in metres: x along the kick, y to its left [default: the reference's ball]
     #[arg(long, value_name = "X,Y", allow_hyphen_values = true, value_parser = point)]
     ball: Option<[f64; 2]>,
-    /// Where in the reference to start, in seconds [default: where the support foot is planted]
+    /// Where in the reference to start, in seconds [default: where the support foot is planted; for a policy, its start]
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     start: Option<f64>,
     /// How long to simulate, in seconds [default: to the reference's end, and 1.2 s past its impact]
@@ -93,6 +98,8 @@ struct Tried {
     robot: Arc<Robot>,
     reference: Arc<Reference>,
     reference_file: PathBuf,
+    /// The policy's file, where one ran.
+    policy: Option<PathBuf>,
     /// Where in the reference it started, s.
     start: f64,
     settings: TrialSettings,
@@ -111,13 +118,11 @@ impl Kick {
         if let Some(name) = &self.engine {
             return self.on_request(name, output);
         }
-        let reference_file = places::reference(&self.reference)?;
-        let reference = Arc::new(Reference::load(&reference_file)?);
-        let robot = Arc::new(places::robot(self.robot.as_deref().unwrap_or(&reference.robot))?);
+        let Ready { robot, reference, reference_file, start, mut controller, q, v } = match &self.policy {
+            Some(file) => self.with_policy(file)?,
+            None => self.with_playback()?,
+        };
         let phases = &reference.phases;
-        let start = self.start.unwrap_or(phases.t_plant);
-        let mut engine = Playback::new(&robot, Arc::clone(&reference), start)
-            .map_err(|error| Failure::from(error).about(reference_file.display()))?;
         let until = reference.duration().max(phases.t_impact + AFTERMATH);
         let duration = self.duration.unwrap_or(until - start);
         if !(duration > 0.0 && duration <= LONGEST) {
@@ -130,7 +135,6 @@ impl Kick {
         }
 
         let [x, y] = self.ball.unwrap_or([reference.ball[0], reference.ball[1]]);
-        let (q, v) = engine.initial_state();
         let settings = TrialSettings {
             world,
             seed: self.seed,
@@ -141,15 +145,64 @@ impl Kick {
             ball: BallState::at_rest([x, y, world.ball.radius]),
             direction: 0.0,
         };
-        let trial = trial::run(&robot, &settings, &mut engine)?;
-        let tried = Tried { robot, reference, reference_file, start, settings, trial, report, recording };
+        let trial = trial::run(&robot, &settings, controller.as_mut())?;
+        let tried = Tried {
+            robot,
+            reference,
+            reference_file,
+            policy: self.policy,
+            start,
+            settings,
+            trial,
+            report,
+            recording,
+        };
         tried.write()?;
         output.show(&Measures::new(&tried), |paint| summary::text(&tried, paint))?;
         Ok(ExitCode::SUCCESS)
     }
 }
 
+/// A controller with all that its trial needs.
+struct Ready {
+    robot: Arc<Robot>,
+    reference: Arc<Reference>,
+    reference_file: PathBuf,
+    /// Where in the reference it starts, s.
+    start: f64,
+    controller: Box<dyn Controller>,
+    q: Vec<f64>,
+    v: Vec<f64>,
+}
+
 impl Kick {
+    /// Plays a reference open loop.
+    fn with_playback(&self) -> Result<Ready, Failure> {
+        let reference_file = places::reference(&self.reference)?;
+        let reference = Arc::new(Reference::load(&reference_file)?);
+        let robot = Arc::new(places::robot(self.robot.as_deref().unwrap_or(&reference.robot))?);
+        let start = self.start.unwrap_or(reference.phases.t_plant);
+        let engine = Playback::new(&robot, Arc::clone(&reference), start)
+            .map_err(|error| Failure::from(error).about(reference_file.display()))?;
+        let (q, v) = engine.initial_state();
+        Ok(Ready { robot, reference, reference_file, start, controller: Box::new(engine), q, v })
+    }
+
+    /// Runs a policy.
+    fn with_policy(&self, file: &Path) -> Result<Ready, Failure> {
+        let policy = crate::train::policy(file)?;
+        let robot = Arc::new(places::robot(self.robot.as_deref().unwrap_or(&policy.header.robot))?);
+        let reference = Arc::clone(&policy.reference);
+        let reference_file = PathBuf::from(&policy.header.reference);
+        let from = policy.header.window[0];
+        let start = self.start.unwrap_or(from);
+        let mut engine = PolicyKick::new(Arc::clone(&robot), &policy, start - from)
+            .map_err(|error| Failure::from(error).about(file.display()))?;
+        engine.begin();
+        let (q, v) = engine.initial_state();
+        Ok(Ready { robot, reference, reference_file, start, controller: Box::new(engine), q, v })
+    }
+
     /// Kicks on request.
     fn on_request(&self, engine: &str, output: &Output) -> Result<ExitCode, Failure> {
         let Some(robot) = self.robot.as_deref() else {
@@ -169,7 +222,7 @@ impl Kick {
 }
 
 /// Reads and checks the constants of the world.
-fn world_settings(path: &Path) -> Result<WorldSettings, Failure> {
+pub(crate) fn world_settings(path: &Path) -> Result<WorldSettings, Failure> {
     places::existing_file("--world", path, "constants of the world (TOML)")?;
     let text = std::fs::read_to_string(path)
         .map_err(|e| Failure::input(format!("{}: cannot be read: {e}; expected TOML", path.display())))?;
@@ -186,6 +239,14 @@ impl Tried {
         page::page(self).save(batch.stage(&self.report)?)?;
         recording::recording(self)?.save(batch.stage(&self.recording)?)?;
         batch.commit()
+    }
+
+    /// What steered the robot, in words.
+    fn steered(&self) -> String {
+        self.policy.as_ref().map_or_else(
+            || "open loop".into(),
+            |file| format!("followed by the policy {}", file.file_name().unwrap_or_default().to_string_lossy()),
+        )
     }
 
     /// How the reference was made, in words.
@@ -228,6 +289,8 @@ struct Measures<'a> {
     segments: &'a [trial::SegmentPeak],
     robot: &'a str,
     reference: &'a Path,
+    /// Null for a reference that was played open loop.
+    policy: Option<&'a Path>,
     reference_kind: ReferenceKind,
     reference_start: f64,
     reference_duration: f64,
@@ -266,6 +329,7 @@ impl<'a> Measures<'a> {
             segments: &trial.segments,
             robot: &tried.robot.name,
             reference: &tried.reference_file,
+            policy: tried.policy.as_deref(),
             reference_kind: tried.reference.kind,
             reference_start: tried.start,
             reference_duration: tried.reference.duration(),

@@ -6,6 +6,7 @@
 //! right, and nothing was written.
 
 mod bench;
+mod eval;
 mod failure;
 mod figure;
 mod files;
@@ -16,6 +17,7 @@ mod places;
 mod retarget;
 mod robot;
 mod ros;
+mod train;
 
 use std::process::ExitCode;
 
@@ -38,6 +40,8 @@ struct Cli {
 enum Command {
     /// Measure engines, robots and scenarios against each other in one table
     Bench(bench::Bench),
+    /// Measure a policy over seeded trials
+    Eval(eval::Eval),
     /// Let a robot kick a ball, from a reference or by an engine, and measure what happens
     Kick(kick::Kick),
     /// Turn a human kick (ASF/AMC or BVH) into a reference for a robot
@@ -47,6 +51,8 @@ enum Command {
     Robot(robot::RobotCommand),
     /// Offer the kick as a ROS 2 action, for a real or a simulated robot; no ROS has to be installed
     Ros(ros::Ros),
+    /// Train a policy that follows a reference, or that kicks the ball with it
+    Train(train::Train),
 }
 
 fn main() -> ExitCode {
@@ -55,10 +61,12 @@ fn main() -> ExitCode {
     let output = Output::new(cli.json);
     let done = match cli.command {
         Command::Bench(bench) => bench.run(&output),
+        Command::Eval(eval) => eval.run(&output),
         Command::Kick(kick) => kick.run(&output),
         Command::Retarget(retarget) => retarget.run(&output),
         Command::Robot(command) => command.run(&output),
         Command::Ros(ros) => ros.run(&output),
+        Command::Train(train) => train.run(&output),
     };
     match done {
         Ok(code) => code,

@@ -45,6 +45,15 @@ pub(crate) fn reference(path: &Path) -> Result<PathBuf, Failure> {
     existing_file("--reference", found.as_deref().unwrap_or(path), "a reference (JSON), as `instep retarget` writes it")
 }
 
+/// The policy that the user means: a path, or one of the shipped ones as `policies/<robot>/<name>.safetensors`.
+///
+/// # Errors
+/// When there is none.
+pub(crate) fn policy(path: &Path) -> Result<PathBuf, Failure> {
+    let found = if path.is_relative() { find(path) } else { None };
+    existing_file("--policy", found.as_deref().unwrap_or(path), "a policy (safetensors), as `instep train` writes it")
+}
+
 /// The folder of KickBench's scenarios.
 ///
 /// # Errors

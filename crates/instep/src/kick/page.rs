@@ -30,9 +30,10 @@ pub(super) fn page(tried: &Tried) -> Report {
     Report {
         title,
         subtitle: format!(
-            "{} \u{b7} {file} ({}), open loop from {:.3} s \u{b7} ball at ({:.3}, {:.3}) m \u{b7} seed {}",
+            "{} \u{b7} {file} ({}), {} from {:.3} s \u{b7} ball at ({:.3}, {:.3}) m \u{b7} seed {}",
             tried.robot.title,
             tried.kind(),
+            tried.steered(),
             tried.start,
             ball[0],
             ball[1],
@@ -325,9 +326,17 @@ fn notes(tried: &Tried) -> Vec<String> {
     let step = &tried.settings.world.step;
     vec![
         format!("The reference was {}.", summary::start(tried)),
-        "The reference is played open loop: joint angles and speeds go to the drives as they stand in it. Nothing \
-         keeps the robot in balance, and what a motor cannot give is lost."
-            .into(),
+        match tried.policy {
+            None => {
+                "The reference is played open loop: joint angles and speeds go to the drives as they stand in it. \
+                 Nothing keeps the robot in balance, and what a motor cannot give is lost."
+            }
+            Some(_) => {
+                "The policy corrects the reference's joint angles 50 times a second from what its sensors tell: \
+                 encoders, inertial sensor, foot pressure and a sight of the ball."
+            }
+        }
+        .into(),
         format!(
             "Time step {} ms, {} ms while the ball is near a foot. Ball speed is that at the last contact of the \
              first impact. The audit: kinetic energy may not grow by more than motors and gravity gave, effective \

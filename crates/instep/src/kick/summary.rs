@@ -69,7 +69,7 @@ fn write_all(out: &mut String, tried: &Tried, paint: Paint) -> std::fmt::Result 
     let (trial, robot) = (&tried.trial, &tried.robot);
     let name = tried.reference_file.file_name().unwrap_or_default().to_string_lossy();
     writeln!(out, "{}", paint.strong(&robot.title))?;
-    writeln!(out, "{name} ({}), open loop", tried.kind())?;
+    writeln!(out, "{name} ({}), {}", tried.kind(), tried.steered())?;
     writeln!(out, "{}\n", paint.faint(&start(tried).replacen("; ", ";\n", 1)))?;
 
     let row = |label: &str, value: String| format!("  {} {value}\n", paint.faint(&format!("{label:<15}")));

@@ -1,0 +1,254 @@
+//! What a policy is worth: seeded trials in the world in which every kick is measured, with the ball at its place.
+//!
+//! A trial starts in the track's first state (or a later one) with the small errors of [`StartSettings`], and goes on until two
+//! seconds after the contact, or the end of the stand if that is later.
+
+use std::sync::Arc;
+
+use instep_kick::policy::{Policy, PolicyKick};
+use instep_robot::Robot;
+use instep_sim::settings::WorldSettings;
+use instep_sim::trial::{self, Trial, TrialSettings};
+use instep_sim::{BallState, World};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use crate::LearnError;
+use crate::environment::Scene;
+use crate::settings::{ClipSettings, LearnSettings, StartSettings};
+
+/// A trial counts as completed while no link is farther from the reference than this, m: paper 1's fixed threshold.
+pub const COMPLETED: f64 = 0.3;
+/// How long after the contact a robot must be upright, s.
+const UPRIGHT: f64 = 2.0;
+
+/// What is to be tried.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Evaluation {
+    /// Number of trials.
+    pub trials: usize,
+    /// Seed of the first; each has its own.
+    pub seed: u64,
+    /// Where in the track they start, s.
+    pub start: f64,
+    /// Errors of the start, and the stand that is part of the trial.
+    pub errors: StartSettings,
+    /// The world.
+    pub world: WorldSettings,
+}
+
+impl Default for Evaluation {
+    fn default() -> Self {
+        Self {
+            trials: 100,
+            seed: 1,
+            start: 0.0,
+            errors: StartSettings::default(),
+            world: WorldSettings::default(),
+        }
+    }
+}
+
+/// What came of one trial.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Tried {
+    /// Its seed.
+    pub seed: u64,
+    /// Whether no link left the reference by more than [`COMPLETED`] before the clip's end, and the robot did not fall.
+    pub completed: bool,
+    /// Mean over the clip and the links of the distance from the reference, m.
+    pub link_error: f64,
+    /// m/s; `None` when the ball was not touched or the audit refused the impact.
+    pub ball_speed: Option<f64>,
+    /// From straight ahead to the ball's direction, positive to the left, degrees.
+    pub direction_error_deg: Option<f64>,
+    /// Whether the robot stood to the trial's end, at least two seconds after the contact.
+    pub upright: bool,
+    /// When it fell, s.
+    pub fell_at: Option<f64>,
+    /// Whether the ball was hit but the audit refused it.
+    pub audit_invalid: bool,
+    /// Joints beyond a torque or speed limit.
+    pub limit_violations: usize,
+}
+
+/// What came of all.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Summary {
+    /// Number of trials.
+    pub trials: usize,
+    /// Share that followed the clip to its end.
+    pub completed_rate: f64,
+    /// Mean of the trials' link errors, m.
+    pub link_error_mean: f64,
+    /// Their standard deviation, m.
+    pub link_error_deviation: f64,
+    /// Median of the audited ball speeds, m/s.
+    pub ball_speed_median: Option<f64>,
+    /// Median of the absolute direction errors, degrees.
+    pub direction_error_median_deg: Option<f64>,
+    /// Share that stood to the end.
+    pub upright_rate: f64,
+    /// Share that touched the ball.
+    pub hit_rate: f64,
+    /// Hits that the audit refused.
+    pub audit_invalid: usize,
+    /// Joints beyond a limit, over all trials.
+    pub limit_violations: usize,
+    /// Each trial.
+    pub each: Vec<Tried>,
+}
+
+/// Tries `policy` on `robot`; `told` is called after each trial, from any thread.
+///
+/// # Errors
+/// When policy and robot do not fit, or a simulation diverges.
+pub fn evaluate(
+    robot: &Arc<Robot>,
+    policy: &Policy,
+    evaluation: &Evaluation,
+    told: &(dyn Fn() + Sync),
+) -> Result<Summary, LearnError> {
+    let [from, to] = policy.header.window;
+    let settings = LearnSettings {
+        clip: ClipSettings { from: Some(from), to: Some(to) },
+        follower: policy.header.follower.clone(),
+        start: evaluation.errors.clone(),
+        ..LearnSettings::default()
+    };
+    let scene = Scene::new(Arc::clone(robot), Arc::clone(&policy.reference), settings)?;
+    let each = (0..evaluation.trials as u64)
+        .into_par_iter()
+        .map_init(
+            || None,
+            |world, index| {
+                let world = match world {
+                    Some(world) => world,
+                    None => world.insert(World::new(Arc::clone(robot), &evaluation.world)?),
+                };
+                let tried = attempt(robot, policy, evaluation, &scene, world, evaluation.seed + index);
+                told();
+                tried
+            },
+        )
+        .collect::<Result<Vec<_>, LearnError>>()?;
+    Ok(summary(each))
+}
+
+/// One trial of a policy with the small start errors of its seed, and the settings that it was run with.
+///
+/// # Errors
+/// As [`evaluate`].
+pub fn kick(
+    robot: &Arc<Robot>,
+    policy: &Policy,
+    evaluation: &Evaluation,
+    world: &mut World,
+    seed: u64,
+) -> Result<(TrialSettings, Trial), LearnError> {
+    let mut engine = PolicyKick::new(Arc::clone(robot), policy, evaluation.start)?;
+    let (mut q, mut v) = engine.initial_state();
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let errors = &evaluation.errors;
+    let mut draw = |deviation: f64| deviation * rng.sample::<f64, _>(StandardNormal);
+    for (i, joint) in robot.joints.iter().enumerate() {
+        q[7 + i] = (q[7 + i] + draw(errors.joint)).clamp(joint.range[0], joint.range[1]);
+        v[6 + i] += draw(errors.joint_speed);
+    }
+    v[..3].iter_mut().for_each(|v| *v += draw(errors.base_speed));
+    engine.begin();
+    let track = engine.follower().track();
+    let (contact, end) = (track.contact_time(), track.duration() + errors.stand);
+    let settings = TrialSettings {
+        world: evaluation.world,
+        seed,
+        duration: end.max(contact + UPRIGHT) - evaluation.start,
+        control_period: evaluation.world.step.far,
+        q,
+        v,
+        ball: BallState::at_rest(policy.reference.ball),
+        direction: 0.0,
+    };
+    let trial = trial::run_in(world, &settings, &mut engine)?;
+    Ok((settings, trial))
+}
+
+fn attempt(
+    robot: &Arc<Robot>,
+    policy: &Policy,
+    evaluation: &Evaluation,
+    scene: &Scene,
+    world: &mut World,
+    seed: u64,
+) -> Result<Tried, LearnError> {
+    let (_, trial) = kick(robot, policy, evaluation, world, seed)?;
+    let period = policy.header.follower.period;
+    let track = scene.follower().track();
+    let mut data = robot.data();
+    let (mut sum, mut count, mut farthest) = (0.0, 0u32, 0.0f64);
+    let mut next = 0.0;
+    for (i, &time) in trial.record.times.iter().enumerate() {
+        let at = evaluation.start + time;
+        if at > track.duration() + 1e-9 {
+            break;
+        }
+        if time + 1e-9 < next {
+            continue;
+        }
+        next += period;
+        let tick = (at / period).round() as usize;
+        let row = |values| trial.record.row(values, i);
+        let deviation = scene.deviation(tick, row(&trial.record.q), row(&trial.record.v), &mut data);
+        sum += deviation.links;
+        count += 1;
+        farthest = farthest.max(deviation.farthest.0);
+    }
+    let valid = trial.audit.verdict() == "valid";
+    let hit = trial.impact.is_some();
+    let clip_end = track.duration() - evaluation.start;
+    Ok(Tried {
+        seed,
+        completed: farthest <= COMPLETED && trial.fell_at.is_none_or(|time| time > clip_end),
+        link_error: sum / f64::from(count.max(1)),
+        ball_speed: trial.impact.as_ref().filter(|_| valid).map(instep_sim::impact::Impact::ball_speed),
+        direction_error_deg: trial.direction_error.map(f64::to_degrees),
+        upright: trial.upright(),
+        fell_at: trial.fell_at,
+        audit_invalid: hit && !valid,
+        limit_violations: trial.limit_violations.len(),
+    })
+}
+
+fn summary(each: Vec<Tried>) -> Summary {
+    let count = each.len().max(1) as f64;
+    let share = |good: &dyn Fn(&Tried) -> bool| each.iter().filter(|tried| good(tried)).count() as f64 / count;
+    let mean = each.iter().map(|tried| tried.link_error).sum::<f64>() / count;
+    let variance = each.iter().map(|tried| (tried.link_error - mean).powi(2)).sum::<f64>() / count;
+    Summary {
+        trials: each.len(),
+        completed_rate: share(&|tried| tried.completed),
+        link_error_mean: mean,
+        link_error_deviation: variance.sqrt(),
+        ball_speed_median: median(each.iter().filter_map(|tried| tried.ball_speed)),
+        direction_error_median_deg: median(each.iter().filter_map(|tried| tried.direction_error_deg.map(f64::abs))),
+        upright_rate: share(&|tried| tried.upright),
+        hit_rate: share(&|tried| tried.direction_error_deg.is_some()),
+        audit_invalid: each.iter().filter(|tried| tried.audit_invalid).count(),
+        limit_violations: each.iter().map(|tried| tried.limit_violations).sum(),
+        each,
+    }
+}
+
+fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_by(f64::total_cmp);
+    let middle = values.len() / 2;
+    match values.len() {
+        0 => None,
+        n if n % 2 == 1 => Some(values[middle]),
+        _ => Some(0.5 * (values[middle - 1] + values[middle])),
+    }
+}

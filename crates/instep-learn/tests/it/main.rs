@@ -1,0 +1,4 @@
+//! Training from end to end, small.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod training;

@@ -1,0 +1,79 @@
+//! `instep eval`: the paper's measures of a policy over seeded trials.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::Arc;
+
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use instep_learn::evaluate::{Evaluation, Summary, evaluate};
+
+use crate::failure::Failure;
+use crate::output::{Output, Paint};
+use crate::{kick, places, train};
+
+/// The arguments of `instep eval`.
+#[derive(Debug, Args)]
+pub(crate) struct Eval {
+    /// The policy: a file that `instep train` wrote
+    policy: PathBuf,
+    /// Number of trials
+    #[arg(long, value_name = "N", default_value_t = 100)]
+    trials: usize,
+    /// Seed of the first trial; each has the next
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Where in the policy's clip the trials start, in seconds
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.0, allow_negative_numbers = true)]
+    start: f64,
+    /// Constants of the world, as TOML; what is absent keeps its default
+    #[arg(long, value_name = "FILE")]
+    world: Option<PathBuf>,
+    /// Number of threads [default: one a core]; the result does not depend on it
+    #[arg(long, value_name = "N")]
+    threads: Option<usize>,
+}
+
+impl Eval {
+    /// Runs the command.
+    ///
+    /// # Errors
+    /// When something handed in cannot be used or a simulation diverges.
+    pub(crate) fn run(self, output: &Output) -> Result<ExitCode, Failure> {
+        if !(1..=1_000_000).contains(&self.trials) {
+            return Err(Failure::input(format!("--trials: {}; expected 1 to 1000000", self.trials)));
+        }
+        train::threads(self.threads)?;
+        let policy = train::policy(&self.policy)?;
+        let robot = Arc::new(places::robot(&policy.header.robot)?);
+        let world = self.world.as_deref().map(kick::world_settings).transpose()?.unwrap_or_default();
+        let evaluation =
+            Evaluation { trials: self.trials, seed: self.seed, start: self.start, world, ..Evaluation::default() };
+        let bar = ProgressBar::new(self.trials as u64);
+        if let Ok(style) = ProgressStyle::with_template("{wide_bar} {pos}/{len} trials {eta}") {
+            bar.set_style(style);
+        }
+        let summary = evaluate(&robot, &policy, &evaluation, &|| bar.inc(1))?;
+        bar.finish_and_clear();
+        output.show(&summary, |paint| text(&summary, paint))?;
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+fn text(summary: &Summary, paint: Paint) -> String {
+    let row = |label: &str, value: String| format!("  {} {value}", paint.faint(&format!("{label:<18}")));
+    let or_none = |value: Option<f64>, unit: &str| value.map_or("none".into(), |v| format!("{v:.2} {unit}"));
+    let share = |value: f64| format!("{:.0} %", 100.0 * value);
+    [
+        format!("{} trials", summary.trials),
+        row("to the clip's end", share(summary.completed_rate)),
+        row("link error", format!("{:.3} \u{b1} {:.3} m", summary.link_error_mean, summary.link_error_deviation)),
+        row("ball hit", share(summary.hit_rate)),
+        row("ball speed", format!("{} (median of the valid)", or_none(summary.ball_speed_median, "m/s"))),
+        row("direction error", format!("{} (median)", or_none(summary.direction_error_median_deg, "deg"))),
+        row("upright", share(summary.upright_rate)),
+        row("audit refused", summary.audit_invalid.to_string()),
+        row("limits passed", summary.limit_violations.to_string()),
+    ]
+    .join("\n")
+}
