@@ -15,7 +15,7 @@ use instep_learn::train::Training;
 use instep_motion::reference::Reference;
 use instep_robot::Robot;
 use instep_robot::control::JointCommand;
-use instep_sim::{BallState, World};
+use instep_sim::BallState;
 use rayon::prelude::*;
 
 /// Control steps a second that a laptop should reach on two cores.
@@ -30,6 +30,8 @@ fn main() {
     let reference = Arc::new(Reference::load(&root.join("references/prestoe/10_03_kinodynamic.json")).unwrap());
     let mut settings = LearnSettings::default();
     (settings.clip.from, settings.clip.to) = (Some(0.15), Some(2.4));
+    if let Ok(t) = std::env::var("TOL") { settings.world.solver_tolerance = t.parse().unwrap(); }
+    if let Ok(t) = std::env::var("ITS") { settings.world.solver_iterations = t.parse().unwrap(); }
     let scene = Arc::new(Scene::new(Arc::clone(&robot), Arc::clone(&reference), settings.clone()).unwrap());
     let mut training = Training::new(robot, reference, "10_03", settings, 1, u64::MAX, None).unwrap();
     let first = training.iterate().unwrap();
@@ -62,7 +64,7 @@ fn main() {
     println!("  together {rate:.0} control steps a second: {:.2} of the {LIMIT} that two cores should reach", rate / LIMIT);
 }
 
-fn time(threads: usize, work: impl Fn(usize) + Sync) -> f64 {
+fn time(threads: usize, work: impl Fn(usize) + Sync + Send) -> f64 {
     let start = Instant::now();
     (0..threads).into_par_iter().for_each(work);
     start.elapsed().as_secs_f64()
@@ -71,7 +73,7 @@ fn time(threads: usize, work: impl Fn(usize) + Sync) -> f64 {
 /// Steps a world under the reference's own commands.
 fn physics(scene: &Scene, steps: usize) {
     let mut follower = scene.follower().clone();
-    let mut world = World::new(Arc::clone(&scene.robot), &scene.world_settings()).unwrap();
+    let mut world = scene.world().unwrap();
     let mut command = JointCommand::zeros(scene.robot.joints.len());
     let mut state = instep_kick::policy::TrackState::default();
     let far = scene.settings.world.step;

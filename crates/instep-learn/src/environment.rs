@@ -112,6 +112,16 @@ impl Scene {
         }
     }
 
+    /// A world of the training.
+    ///
+    /// # Errors
+    /// When it cannot be made.
+    pub fn world(&self) -> Result<World, LearnError> {
+        let mut world = World::new(Arc::clone(&self.robot), &self.world_settings())?;
+        world.set_solver(self.settings.world.solver_iterations, self.settings.world.solver_tolerance);
+        Ok(world)
+    }
+
     /// How far a robot at `q`, `v` is from the reference at `tick`; `data` is scratch space.
     #[must_use]
     pub fn deviation(&self, tick: usize, q: &[f64], v: &[f64], data: &mut RobotData) -> Deviation {
@@ -184,7 +194,7 @@ impl Environment {
     /// # Errors
     /// When the world cannot be made.
     pub fn new(scene: Arc<Scene>, seed: u64, index: usize) -> Result<Self, LearnError> {
-        let world = World::new(Arc::clone(&scene.robot), &scene.world_settings())?;
+        let world = scene.world()?;
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(index as u64 + 1);
         let follower = scene.follower.clone();

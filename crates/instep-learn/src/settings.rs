@@ -228,6 +228,10 @@ impl Default for NetworkSettings {
 pub struct WorldSettings {
     /// Physics step away from the ball, s. Trials are measured at the world's own, finer one.
     pub step: f64,
+    /// Most iterations of the contact solver in a step; trials are measured with more.
+    pub solver_iterations: usize,
+    /// Gain at which the contact solver stops; trials are measured with a smaller one.
+    pub solver_tolerance: f64,
     /// Whether the ball lies at its place; without, it lies far away.
     pub ball: bool,
     /// Noise and delay of the sensors.
@@ -236,7 +240,13 @@ pub struct WorldSettings {
 
 impl Default for WorldSettings {
     fn default() -> Self {
-        Self { step: 0.004, ball: false, sensors: instep_sim::settings::SensorNoise::default() }
+        Self {
+            step: 0.004,
+            solver_iterations: 10,
+            solver_tolerance: 1e-5,
+            ball: false,
+            sensors: instep_sim::settings::SensorNoise::default(),
+        }
     }
 }
 
@@ -336,6 +346,10 @@ impl LearnSettings {
             let worst = sizes.iter().copied().max().unwrap_or(0);
             check(&format!("network.{name}"), worst as f64, good, "at most 8 layers of 1 to 8192")?;
         }
+        let iterations = self.world.solver_iterations;
+        check("world.solver_iterations", iterations as f64, (1..=1000).contains(&iterations), "1 to 1000")?;
+        let tolerance = self.world.solver_tolerance;
+        check("world.solver_tolerance", tolerance, (0.0..=1e-2).contains(&tolerance), "in [0, 0.01]")?;
         let period = self.follower.period;
         check("follower.period", period, (0.001..=0.1).contains(&period), "0.001 to 0.1 s")?;
         let scale = self.follower.scale;

@@ -432,6 +432,14 @@ impl World {
         self.settings.step = step;
     }
 
+    /// Ends the contact solver after `iterations`, or when an iteration gains less than `tolerance` (MuJoCo's scaled cost). Trials
+    /// are measured with the world's own, finer limits; a training that takes millions of steps need not be.
+    pub fn set_solver(&mut self, iterations: usize, tolerance: f64) {
+        let options = self.data.model_opt_mut();
+        options.iterations = i32::try_from(iterations).unwrap_or(i32::MAX);
+        options.tolerance = tolerance;
+    }
+
     /// The bare MuJoCo data, for the benchmark that compares with a plain `mj_step` loop.
     pub fn mujoco(&mut self) -> &mut MjData<Box<MjModel>> {
         &mut self.data
