@@ -1,6 +1,8 @@
 //! A policy as ONNX: what other people's programs load. Written by hand: a dozen fields of its protobuf
 //! (onnx.proto, IR version 8, operator set 13) are all that a perceptron needs.
 //!
+//! `tools/check_policy.py` runs the file in ONNX Runtime and compares.
+//!
 //! Input `observation` (samples x observations, f32, as [`instep_kick::policy::Follower`] lays it out, not normalised), output
 //! `action` (samples x joints). Nodes: Sub, Div, Clip, then Gemm and Elu or Relu layer by layer.
 

@@ -11,6 +11,7 @@ mod failure;
 mod figure;
 mod files;
 mod kick;
+mod learn_table;
 mod mujoco_log;
 mod output;
 mod places;
@@ -44,6 +45,8 @@ enum Command {
     Eval(eval::Eval),
     /// Let a robot kick a ball, from a reference or by an engine, and measure what happens
     Kick(kick::Kick),
+    /// Compare three kinds of reference, with and without early termination (paper 1, Table II)
+    LearnTable(learn_table::LearnTable),
     /// Turn a human kick (ASF/AMC or BVH) into a reference for a robot
     Retarget(retarget::Retarget),
     /// Look at a robot's own files
@@ -63,6 +66,7 @@ fn main() -> ExitCode {
         Command::Bench(bench) => bench.run(&output),
         Command::Eval(eval) => eval.run(&output),
         Command::Kick(kick) => kick.run(&output),
+        Command::LearnTable(table) => table.run(&output),
         Command::Retarget(retarget) => retarget.run(&output),
         Command::Robot(command) => command.run(&output),
         Command::Ros(ros) => ros.run(&output),

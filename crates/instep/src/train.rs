@@ -62,7 +62,7 @@ pub(crate) enum Task {
 }
 
 /// `50M`, `500k`, `2e6` or a plain number.
-fn steps(text: &str) -> Result<u64, String> {
+pub(crate) fn steps(text: &str) -> Result<u64, String> {
     let (number, factor) = match text.char_indices().last() {
         Some((at, 'k' | 'K')) => (&text[..at], 1e3),
         Some((at, 'm' | 'M')) => (&text[..at], 1e6),
