@@ -9,6 +9,7 @@
 
 mod bad_input;
 mod kick;
+mod learn;
 mod retarget;
 mod robot;
 mod support;

@@ -1,0 +1,108 @@
+//! `instep train`, `eval`, `kick --policy`, `learn-table`.
+
+use std::path::Path;
+
+use crate::support::{assert_refused, instep, listing, object};
+
+/// A training small enough for a test.
+const SMALL: &str = "
+[clip]
+from = 0.9
+to = 1.6
+[start]
+stand = 0.1
+[ppo]
+environments = 32
+horizon = 8
+minibatch = 128
+epochs = 1
+[network]
+actor = [16]
+critic = [16]
+";
+const REFERENCE: &str = "references/prestoe/10_03_kinodynamic.json";
+
+fn small(folder: &Path) {
+    std::fs::write(folder.join("small.toml"), SMALL).unwrap();
+}
+
+#[test]
+fn a_policy_is_trained_resumed_measured_and_kicks() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    small(at);
+    let train = |budget: &str| {
+        let arguments = ["train", "--reference", REFERENCE, "--settings", "small.toml", "--budget", budget, "--json"];
+        object(&instep(at, &arguments))
+    };
+    let first = train("512");
+    assert_eq!((first["steps"].as_u64(), first["finished"].as_bool()), (Some(512), Some(true)));
+    for file in ["checkpoint.safetensors", "policy.safetensors", "policy.onnx", "README.md", "report.html"] {
+        assert!(at.join("out/train").join(file).exists(), "{file}");
+    }
+    let policy = std::fs::read(at.join("out/train/policy.safetensors")).unwrap();
+    assert!(policy.len() < 5 << 20, "a policy of {} bytes", policy.len());
+
+    let second = train("1024");
+    assert_eq!(second["steps"].as_u64(), Some(1024), "it goes on from the checkpoint");
+    assert_ne!(std::fs::read(at.join("out/train/policy.safetensors")).unwrap(), policy);
+
+    let eval = || instep(at, &["eval", "out/train/policy.safetensors", "--trials", "2", "--json"]);
+    let (once, twice) = (eval(), eval());
+    assert_eq!(once.stdout, twice.stdout);
+    let measures = object(&once);
+    for key in [
+        "trials",
+        "completed_rate",
+        "link_error_mean",
+        "ball_speed_median",
+        "direction_error_median_deg",
+        "upright_rate",
+        "audit_invalid",
+        "limit_violations",
+    ] {
+        assert!(measures.get(key).is_some(), "{key}");
+    }
+    assert_eq!(measures["trials"].as_u64(), Some(2));
+
+    let kick = object(&instep(at, &["kick", "--policy", "out/train/policy.safetensors", "--json"]));
+    assert_eq!(kick["policy"].as_str(), Some("out/train/policy.safetensors"));
+    assert_eq!(kick["reference_start"].as_f64(), Some(0.9));
+    assert!(at.join("out/kick/report.html").exists());
+}
+
+#[test]
+fn what_cannot_be_trained_or_run_is_said_in_one_message() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    small(at);
+    std::fs::write(at.join("wrong.toml"), "[ppo]\nclip = 3.0\n").unwrap();
+    std::fs::write(at.join("noise.safetensors"), [7u8; 300]).unwrap();
+    let cases: [(&[&str], &str); 7] = [
+        (&["train"], "--reference"),
+        (&["train", "--reference", "none.json"], "none.json"),
+        (&["train", "--reference", REFERENCE, "--budget", "soon"], "500k"),
+        (&["train", "--reference", REFERENCE, "--settings", "wrong.toml"], "ppo.clip"),
+        (&["train", "--reference", REFERENCE, "--from", "noise.safetensors"], "noise.safetensors"),
+        (&["eval", "noise.safetensors"], "noise.safetensors"),
+        (&["eval", "none.safetensors"], "none.safetensors"),
+    ];
+    let before = listing(at);
+    for (arguments, expected) in cases {
+        assert_refused(&instep(at, arguments), &[expected], at, &before);
+    }
+}
+
+#[test]
+fn a_checkpoint_of_other_settings_is_not_gone_on_from() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    small(at);
+    let train = |settings: &str| {
+        instep(at, &["train", "--reference", REFERENCE, "--settings", settings, "--budget", "256", "--json"])
+    };
+    object(&train("small.toml"));
+    std::fs::write(at.join("other.toml"), SMALL.replace("[16]", "[8]")).unwrap();
+    let before = listing(at);
+    assert_refused(&train("other.toml"), &["other settings", "--out"], at, &before);
+}
