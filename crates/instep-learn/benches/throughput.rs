@@ -30,8 +30,6 @@ fn main() {
     let reference = Arc::new(Reference::load(&root.join("references/prestoe/10_03_kinodynamic.json")).unwrap());
     let mut settings = LearnSettings::default();
     (settings.clip.from, settings.clip.to) = (Some(0.15), Some(2.4));
-    if let Ok(t) = std::env::var("TOL") { settings.world.solver_tolerance = t.parse().unwrap(); }
-    if let Ok(t) = std::env::var("ITS") { settings.world.solver_iterations = t.parse().unwrap(); }
     let scene = Arc::new(Scene::new(Arc::clone(&robot), Arc::clone(&reference), settings.clone()).unwrap());
     let mut training = Training::new(robot, reference, "10_03", settings, 1, u64::MAX, None).unwrap();
     let first = training.iterate().unwrap();
@@ -61,7 +59,10 @@ fn main() {
         println!("  {name:<28} {:7.1} us a step  {:5.1} %", 1e6 * seconds / count, 100.0 * seconds / total);
     }
     let rate = count / total;
-    println!("  together {rate:.0} control steps a second: {:.2} of the {LIMIT} that two cores should reach", rate / LIMIT);
+    println!(
+        "  together {rate:.0} control steps a second: {:.2} of the {LIMIT} that two cores should reach",
+        rate / LIMIT
+    );
 }
 
 fn time(threads: usize, work: impl Fn(usize) + Sync + Send) -> f64 {
@@ -81,7 +82,7 @@ fn physics(scene: &Scene, steps: usize) {
     let mut track = follower.track().clone();
     for step in 0..steps {
         let tick = step % scene.clip_ticks();
-        if tick % 20 == 0 {
+        if tick.is_multiple_of(20) {
             track.sample_into(tick as f64 * scene.settings.follower.period, &mut state);
             world.reset(&state.q, &state.v, &BallState::at_rest([60.0, 0.0, 0.11])).unwrap();
         }

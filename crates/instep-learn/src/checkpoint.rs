@@ -103,7 +103,9 @@ fn fill(training: &mut Training, bytes: &[u8]) -> Result<(), String> {
         let tensor = file.tensor(name).map_err(|e| format!("tensor {name}: {e}"))?;
         let found: usize = tensor.shape().iter().product();
         if tensor.dtype() != kind || found != len {
-            return Err(format!("tensor {name}: {found} numbers; expected {len}: the checkpoint is of another training"));
+            return Err(format!(
+                "tensor {name}: {found} numbers; expected {len}: the checkpoint is of another training"
+            ));
         }
         Ok(tensor.data())
     };

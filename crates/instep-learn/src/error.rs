@@ -27,7 +27,9 @@ pub enum LearnError {
         detail: String,
     },
     /// Something that is not a number where training needs one. Nothing was learned from it.
-    #[error("training stopped at {steps} steps: {what} is {value}; the last checkpoint is good, go on from it with other settings")]
+    #[error(
+        "training stopped at {steps} steps: {what} is {value}; the last checkpoint is good, go on from it with other settings"
+    )]
     NotFinite {
         /// What it is.
         what: String,

@@ -42,13 +42,7 @@ pub struct Evaluation {
 
 impl Default for Evaluation {
     fn default() -> Self {
-        Self {
-            trials: 100,
-            seed: 1,
-            start: 0.0,
-            errors: StartSettings::default(),
-            world: WorldSettings::default(),
-        }
+        Self { trials: 100, seed: 1, start: 0.0, errors: StartSettings::default(), world: WorldSettings::default() }
     }
 }
 

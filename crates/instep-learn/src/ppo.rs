@@ -201,9 +201,7 @@ impl Ppo {
                 let log_change = log - old_sigma.ln();
                 log_ratio += f64::from(0.5 * (old_z * old_z - z * z) - log_change);
                 let shift = mean - old;
-                kl += f64::from(
-                    log_change + (old_sigma * old_sigma + shift * shift) / (2.0 * sigma * sigma) - 0.5,
-                );
+                kl += f64::from(log_change + (old_sigma * old_sigma + shift * shift) / (2.0 * sigma * sigma) - 0.5);
             }
             let advantage = f64::from(samples.advantages[chunk[i]]);
             let ratio = log_ratio.exp();

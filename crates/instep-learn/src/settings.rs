@@ -291,9 +291,7 @@ impl LearnSettings {
         }
         let sum = reward.w_k + reward.w_q + reward.w_v + reward.w_c;
         check("reward: w_k + w_q + w_v + w_c", sum, sum > 0.0, "above 0")?;
-        for (name, factor) in
-            [("k_k", reward.k_k), ("k_q", reward.k_q), ("k_v", reward.k_v), ("k_c", reward.k_c)]
-        {
+        for (name, factor) in [("k_k", reward.k_k), ("k_q", reward.k_q), ("k_v", reward.k_v), ("k_c", reward.k_c)] {
             check(&format!("reward.{name}"), factor, factor < 0.0, "a number below 0")?;
         }
         for (name, value) in [("ball_scale", reward.ball_scale), ("ball_cap", reward.ball_cap)] {

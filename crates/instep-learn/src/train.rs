@@ -149,10 +149,11 @@ impl Training {
         let threshold = self.threshold();
         let (samples, told) = self.rollout.collect(self.ppo.weights(), threshold)?;
         let order = self.state.seed.wrapping_mul(0x9E37_79B9_7F4A_7C15).wrapping_add(self.state.iteration);
-        let update = self
-            .ppo
-            .update(&samples, order)
-            .map_err(|(what, value)| LearnError::NotFinite { what, value, steps: self.state.steps })?;
+        let update = self.ppo.update(&samples, order).map_err(|(what, value)| LearnError::NotFinite {
+            what,
+            value,
+            steps: self.state.steps,
+        })?;
         Ok(self.note(&told, &update, threshold))
     }
 

@@ -146,17 +146,8 @@ impl Kick {
             direction: 0.0,
         };
         let trial = trial::run(&robot, &settings, controller.as_mut())?;
-        let tried = Tried {
-            robot,
-            reference,
-            reference_file,
-            policy: self.policy,
-            start,
-            settings,
-            trial,
-            report,
-            recording,
-        };
+        let tried =
+            Tried { robot, reference, reference_file, policy: self.policy, start, settings, trial, report, recording };
         tried.write()?;
         output.show(&Measures::new(&tried), |paint| summary::text(&tried, paint))?;
         Ok(ExitCode::SUCCESS)

@@ -20,7 +20,12 @@ use crate::{files, places, train};
 
 /// The kinds of reference: name in the table, shipped file, paper 1's link error without and with early termination, m.
 const KINDS: [(&str, &str, &str, &str); 3] = [
-    ("kinematic, foot slip kept", "references/prestoe/10_03_kinematic_slip.json", "0.66 \u{b1} 0.47", "0.14 \u{b1} 0.03"),
+    (
+        "kinematic, foot slip kept",
+        "references/prestoe/10_03_kinematic_slip.json",
+        "0.66 \u{b1} 0.47",
+        "0.14 \u{b1} 0.03",
+    ),
     ("kinematic, no foot slip", "references/prestoe/10_03_kinematic.json", "0.61 \u{b1} 0.51", "0.114 \u{b1} 0.06"),
     ("kinodynamic", "references/prestoe/10_03_kinodynamic.json", "0.60 \u{b1} 0.50", "0.09 \u{b1} 0.02"),
 ];
@@ -179,7 +184,7 @@ fn finish(training: &mut Training, saved: &Path, bar: &ProgressBar) -> Result<()
         let before = training.state.steps;
         let progress = training.iterate()?;
         bar.inc(progress.steps - before);
-        if progress.iteration % 100 == 0 {
+        if progress.iteration.is_multiple_of(100) {
             checkpoint::save(training, saved)?;
         }
     }
@@ -226,9 +231,10 @@ fn page(rows: &[Row], text: &str) -> Report {
             .collect(),
         ..Plot::default()
     };
-    let cells = text.lines().filter(|line| line.starts_with("| ")).skip(1).map(|line| {
-        line.trim_matches('|').split('|').map(|cell| cell.trim().to_owned().into()).collect::<Vec<_>>()
-    });
+    let cells =
+        text.lines().filter(|line| line.starts_with("| ")).skip(1).map(|line| {
+            line.trim_matches('|').split('|').map(|cell| cell.trim().to_owned().into()).collect::<Vec<_>>()
+        });
     Report {
         title: "Three references, with and without early termination".into(),
         subtitle: "paper 1, Table II and Fig 7".into(),

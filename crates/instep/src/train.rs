@@ -210,8 +210,7 @@ impl Train {
                 let hidden = policy.network.layers.len().saturating_sub(1);
                 settings.network.actor = policy.network.layers[..hidden].iter().map(|layer| layer.bias.len()).collect();
             }
-            let training =
-                Training::new(robot, reference, &name, settings, self.seed, self.budget, policy.as_ref())?;
+            let training = Training::new(robot, reference, &name, settings, self.seed, self.budget, policy.as_ref())?;
             return Ok(training);
         }
         let (settings, state) = checkpoint::peek(saved)?;
@@ -345,10 +344,13 @@ fn card(training: &Training) -> String {
     lines.join("\n")
 }
 
+/// What a line of a plot shows of the curve.
+type Value<'a> = &'a dyn Fn(&Progress) -> f64;
+
 /// The report: curves, and why episodes end.
 fn page(training: &Training) -> Report {
     let curve = &training.state.curve;
-    let plot = |title: &str, unit: &str, lines: &[(&str, &dyn Fn(&Progress) -> f64)]| Plot {
+    let plot = |title: &str, unit: &str, lines: &[(&str, Value<'_>)]| Plot {
         title: title.into(),
         x_label: "control steps / million".into(),
         y_label: unit.into(),

@@ -141,10 +141,8 @@ impl KickEngine for PolicyKick {
         let mut data = self.robot.data();
         data.set_position(&q);
         let [left, right] = [0, 1].map(|leg| data.point(&self.robot.legs[leg].sole));
-        let heading = [0, 1]
-            .map(|leg| data.link_rotation(self.robot.legs[leg].foot) * Vector3::x())
-            .iter()
-            .sum::<Vector3<f64>>();
+        let heading =
+            [0, 1].map(|leg| data.link_rotation(self.robot.legs[leg].foot) * Vector3::x()).iter().sum::<Vector3<f64>>();
         let yaw = heading.y.atan2(heading.x);
         let footprint = Isometry3::new(0.5 * (left + right), Vector3::z() * yaw);
         let ball = footprint * Point3::new(request.ball[0], request.ball[1], 0.0);

@@ -67,8 +67,7 @@ impl Policy {
     /// [`KickError::Read`] when the file cannot be read, [`KickError::Parse`] with what is wrong in it.
     pub fn load(path: &Path) -> Result<Self, KickError> {
         let name = path.display().to_string();
-        let bytes =
-            std::fs::read(path).map_err(|e| KickError::Read { file: name.clone(), detail: e.to_string() })?;
+        let bytes = std::fs::read(path).map_err(|e| KickError::Read { file: name.clone(), detail: e.to_string() })?;
         Self::from_bytes(&bytes).map_err(|detail| KickError::Parse { file: name, detail })
     }
 
@@ -139,10 +138,8 @@ impl Policy {
     pub fn follower(&self, robot: &Robot) -> Result<Follower, KickError> {
         let track = Track::new(robot, Arc::clone(&self.reference), self.header.window)?;
         let follower = Follower::new(robot, track, self.header.follower.clone());
-        let (found, expected) = (
-            [self.network.inputs(), self.network.outputs()],
-            [follower.observation_len(), follower.action_len()],
-        );
+        let (found, expected) =
+            ([self.network.inputs(), self.network.outputs()], [follower.observation_len(), follower.action_len()]);
         if found != expected {
             return Err(KickError::Setting {
                 field: "the policy's network".into(),

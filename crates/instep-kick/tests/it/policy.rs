@@ -5,7 +5,9 @@ use std::sync::Arc;
 
 use instep_kick::Playback;
 use instep_kick::policy::odometry::Odometry;
-use instep_kick::policy::{Activation, Follower, FollowerSettings, Layer, Network, Normalizer, Policy, PolicyHeader, Track};
+use instep_kick::policy::{
+    Activation, Follower, FollowerSettings, Layer, Network, Normalizer, Policy, PolicyHeader, Track,
+};
 use instep_motion::reference::Reference;
 use instep_robot::Robot;
 use instep_robot::control::{Controller, JointCommand, Sensors};
@@ -116,7 +118,9 @@ fn a_kick_turned_in_the_plane_looks_the_same() {
         };
         let base = Isometry3::from_parts(
             Vector3::new(state.q[0] + 0.05, state.q[1], state.q[2]).into(),
-            nalgebra::UnitQuaternion::new_normalize(nalgebra::Quaternion::new(state.q[3], state.q[4], state.q[5], state.q[6])),
+            nalgebra::UnitQuaternion::new_normalize(nalgebra::Quaternion::new(
+                state.q[3], state.q[4], state.q[5], state.q[6],
+            )),
         );
         let seen = placement.inverse() * base;
         let turn = seen.rotation;
