@@ -1,4 +1,4 @@
-//! `instep kick`: a robot plays a reference against a ball; what happens is measured, audited, shown and recorded.
+//! `instep kick`: a robot runs a policy, or plays a reference, against a ball; what happens is measured, audited, shown and recorded.
 
 mod engine;
 mod page;
@@ -32,12 +32,12 @@ const LONGEST: f64 = 120.0;
 /// The arguments of `instep kick`.
 #[derive(Debug, Args)]
 pub(crate) struct Kick {
-    /// The motion to play open loop: a file that `instep retarget` wrote
-    #[arg(long, value_name = "FILE", default_value = "references/prestoe/10_03_kinematic.json")]
-    reference: PathBuf,
-    /// The policy to run in place of playing a reference: a file that `instep train` wrote
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["reference", "engine"])]
-    policy: Option<PathBuf>,
+    /// The motion to play open loop, in place of running a policy: a file that `instep retarget` wrote
+    #[arg(long, value_name = "FILE")]
+    reference: Option<PathBuf>,
+    /// The policy to run: a file that `instep train` wrote
+    #[arg(long, value_name = "FILE", default_value = "policies/prestoe/10_03.safetensors", conflicts_with_all = ["reference", "engine"])]
+    policy: PathBuf,
     /// The robot: a name, or the path of its folder or robot.toml [default: the reference's]
     #[arg(long, value_name = "ROBOT")]
     robot: Option<String>,
@@ -118,9 +118,9 @@ impl Kick {
         if let Some(name) = &self.engine {
             return self.on_request(name, output);
         }
-        let Ready { robot, reference, reference_file, start, mut controller, q, v } = match &self.policy {
-            Some(file) => self.with_policy(file)?,
-            None => self.with_playback()?,
+        let Ready { robot, reference, reference_file, start, mut controller, q, v } = match &self.reference {
+            Some(file) => self.with_playback(file)?,
+            None => self.with_policy(&self.policy)?,
         };
         let phases = &reference.phases;
         let until = reference.duration().max(phases.t_impact + AFTERMATH);
@@ -146,8 +146,8 @@ impl Kick {
             direction: 0.0,
         };
         let trial = trial::run(&robot, &settings, controller.as_mut())?;
-        let tried =
-            Tried { robot, reference, reference_file, policy: self.policy, start, settings, trial, report, recording };
+        let policy = self.reference.is_none().then_some(self.policy);
+        let tried = Tried { robot, reference, reference_file, policy, start, settings, trial, report, recording };
         tried.write()?;
         output.show(&Measures::new(&tried), |paint| summary::text(&tried, paint))?;
         Ok(ExitCode::SUCCESS)
@@ -168,8 +168,8 @@ struct Ready {
 
 impl Kick {
     /// Plays a reference open loop.
-    fn with_playback(&self) -> Result<Ready, Failure> {
-        let reference_file = places::reference(&self.reference)?;
+    fn with_playback(&self, file: &Path) -> Result<Ready, Failure> {
+        let reference_file = places::reference(file)?;
         let reference = Arc::new(Reference::load(&reference_file)?);
         let robot = Arc::new(places::robot(self.robot.as_deref().unwrap_or(&reference.robot))?);
         let start = self.start.unwrap_or(reference.phases.t_plant);
