@@ -47,7 +47,7 @@ def main(policy, model):
     (action,) = session.run(["action"], {"observation": seen})
     worst = np.abs(action - x).max() / max(1.0, np.abs(x).max())
     print(f"{header['robot']}: {len(mean)} observations, {x.shape[1]} actions, {layer} layers; worst difference {worst:.1e}")
-    return worst > 1e-4
+    return int(worst > 1e-4)
 
 
 if __name__ == "__main__":
