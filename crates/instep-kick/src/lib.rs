@@ -4,8 +4,8 @@
 //! - [`engine`]: the trait that every engine implements.
 //! - [`dynamic`]: paper 2's engine: splines of foot and trunk in the support foot's frame, stabilised by the centre of
 //!   pressure.
-//! - [`playback`]: plays a reference from a given instant, open loop; [`feedforward`]: the torques that it needs.
-//! - [`policy`]: paper 1's engine: a network that was trained to follow a reference, and its state estimate.
+//! - [`track`]: a window of a reference on one robot; [`playback`]: plays one open loop; [`feedforward`]: the torques that it needs.
+//! - [`policy`]: runs a network that was trained to follow a reference (paper 1), with its state estimate.
 //! - [`tree`] and [`ik`]: kinematics without MuJoCo, and inverse kinematics with weighted goals under joint limits.
 //!
 //! An engine sees sensors, never the simulator's truth, and allocates nothing in a tick.
@@ -19,6 +19,7 @@ pub mod ik;
 pub mod playback;
 pub mod policy;
 pub mod request;
+pub mod track;
 pub mod tree;
 
 pub use engine::{Face, KickEngine, KickPlan, KickStatus, Phase, Progress};

@@ -16,8 +16,8 @@ use serde::{Deserialize, Serialize};
 
 use super::follower::{Follower, FollowerSettings};
 use super::network::{Activation, Layer, Network, Normalizer};
-use super::track::Track;
 use crate::KickError;
+use crate::track::Track;
 
 /// The key of the header among the file's metadata.
 const HEADER: &str = "instep";

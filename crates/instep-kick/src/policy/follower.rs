@@ -16,7 +16,7 @@ use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::odometry::Odometry;
-use super::track::{Track, TrackState};
+use crate::track::{Track, TrackState};
 
 /// A ball farther from its place than this is no longer the one to be kicked, m.
 const BALL_REACH: f64 = 0.4;
@@ -52,8 +52,6 @@ pub struct Follower {
     action: Vec<f32>,
     /// Track time at sensor time zero, s.
     offset: f64,
-    /// `track_from_world`: where the sensors' world lies in the reference's.
-    placement: Isometry3<f64>,
     now: TrackState,
     ahead: TrackState,
 }
@@ -61,7 +59,10 @@ pub struct Follower {
 impl Follower {
     /// For `robot` along `track`.
     #[must_use]
-    pub fn new(robot: &Robot, track: Track, settings: FollowerSettings) -> Self {
+    pub fn new(robot: &Robot, mut track: Track, settings: FollowerSettings) -> Self {
+        // The states get their size here, not in a tick.
+        let mut state = TrackState::default();
+        track.sample_into(0.0, &mut state);
         Self {
             odometry: Odometry::new(robot),
             scale: robot.joints.iter().map(|joint| settings.scale * joint.torque / joint.kp).collect(),
@@ -73,9 +74,8 @@ impl Follower {
                 .collect(),
             action: vec![0.0; robot.joints.len()],
             offset: 0.0,
-            placement: Isometry3::identity(),
-            now: TrackState::default(),
-            ahead: TrackState::default(),
+            now: state.clone(),
+            ahead: state,
             settings,
             track,
         }
@@ -107,17 +107,9 @@ impl Follower {
     }
 
     /// Starts at the sensors' time `time` (s) and the track's time `at` (s) with the robot's base at `position` (m) and
-    /// `velocity` (m/s) in the sensors' world, which `placement` (`track_from_world`) puts into the reference's.
-    pub fn start(
-        &mut self,
-        time: f64,
-        at: f64,
-        placement: Isometry3<f64>,
-        position: Vector3<f64>,
-        velocity: Vector3<f64>,
-    ) {
+    /// `velocity` (m/s) in the reference's world, in which the sensors' orientation is told too.
+    pub fn start(&mut self, time: f64, at: f64, position: Vector3<f64>, velocity: Vector3<f64>) {
         self.offset = at - time;
-        self.placement = placement;
         self.odometry.start(time, position, velocity);
         self.action.fill(0.0);
     }
@@ -179,20 +171,19 @@ impl Follower {
         }
         let reference = base(&self.now.q);
         let back = reference.rotation.inverse();
-        let measured = self.placement.rotation * orientation(&sensors.orientation);
+        let measured = orientation(&sensors.orientation);
         out.push3((back * measured).scaled_axis());
         out.push3(Vector3::from(sensors.gyro) - Vector3::new(self.now.v[3], self.now.v[4], self.now.v[5]));
         out.push3(measured.inverse() * Vector3::z());
-        let position = self.placement * nalgebra::Point3::from(self.odometry.position());
-        out.push3(back * (position.coords - reference.translation.vector));
-        let velocity = self.placement.rotation * self.odometry.velocity();
-        out.push3(back * (velocity - Vector3::new(self.now.v[0], self.now.v[1], self.now.v[2])));
+        let position = self.odometry.position();
+        out.push3(back * (position - reference.translation.vector));
+        out.push3(back * (self.odometry.velocity() - Vector3::new(self.now.v[0], self.now.v[1], self.now.v[2])));
         let mut loads = [0.0; 2];
         for (&leg, force) in self.legs_of_contacts.iter().zip(&sensors.contact_forces) {
             loads[leg] += force / self.weight;
         }
         loads.iter().for_each(|&load| out.push(load.min(3.0)));
-        let ball = self.ball_error(sensors, at, &position.coords, &measured);
+        let ball = self.ball_error(sensors, at, &position, &measured);
         ball.iter().for_each(|&error| out.push(error));
         out.push(self.track.contact_time() - at);
         out.push((self.track.duration() - at).max(0.0));

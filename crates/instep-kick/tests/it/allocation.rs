@@ -4,8 +4,11 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
 use instep_kick::KickEngine;
+use instep_kick::Playback;
+use instep_kick::policy::PolicyKick;
 use instep_robot::control::{Controller, JointCommand};
 
+use crate::policy::{policy, prestoe};
 use crate::rig::{engine, request, robot, standing};
 
 struct Counting;
@@ -50,5 +53,22 @@ fn a_tick_allocates_nothing() {
             }
             assert_eq!(COUNT.get(), before, "{name} allocated in a tick");
         }
+    }
+}
+
+#[test]
+fn neither_playback_nor_policy_allocate_in_a_tick() {
+    let (robot, reference) = prestoe();
+    let mut playback = Playback::new(&robot, reference.clone(), 0.5).unwrap();
+    let mut run = PolicyKick::new(&robot, &policy(&robot, &reference), 0.0).unwrap();
+    for controller in [&mut playback as &mut dyn Controller, &mut run] {
+        let mut sensors = standing(&robot);
+        let mut command = JointCommand::zeros(robot.joints.len());
+        let before = COUNT.get();
+        while sensors.time < 3.2 {
+            controller.tick(&sensors, &mut command);
+            sensors.time += 0.002;
+        }
+        assert_eq!(COUNT.get(), before, "allocated in a tick");
     }
 }

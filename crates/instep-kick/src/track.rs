@@ -1,7 +1,8 @@
-//! The motion that a policy follows: a window of a reference, then a stand in the pose at the window's end.
+//! A window of a reference on one robot, in the robot's joint order, with the torques that it needs; then a stand in the
+//! pose at the window's end. What a playback plays and a policy follows.
 //!
-//! The window leaves out what is no part of the kick: the ends of an optimised reference, where nothing lies beyond
-//! that could hold its speeds, and the steps with which the human walks away. Times here count from the window's start.
+//! A window leaves out what is no part of the kick: the ends of an optimised reference, where nothing lies beyond that
+//! could hold its speeds, and the steps with which the human walks away. Times here count from the window's start.
 
 use std::sync::Arc;
 
@@ -85,6 +86,14 @@ impl Track {
     #[must_use]
     pub fn contact_time(&self) -> f64 {
         self.reference.phases.t_impact - self.window[0]
+    }
+
+    /// Position (7 + n) and speed (6 + n) at `time` (s after the window's start).
+    #[must_use]
+    pub fn initial_state(&self, time: f64) -> (Vec<f64>, Vec<f64>) {
+        let mut state = TrackState::default();
+        self.clone().sample_into(time, &mut state);
+        (state.q, state.v)
     }
 
     /// The state at `time` (s after the window's start), over `state`. After the window it is the pose at its end, at
