@@ -76,7 +76,7 @@ fn physics(scene: &Scene, steps: usize) {
     let mut follower = scene.follower().clone();
     let mut world = scene.world().unwrap();
     let mut command = JointCommand::zeros(scene.robot.joints.len());
-    let mut state = instep_kick::policy::TrackState::default();
+    let mut state = instep_kick::track::TrackState::default();
     let far = scene.settings.world.step;
     let substeps = (scene.settings.follower.period / far).round() as usize;
     let mut track = follower.track().clone();

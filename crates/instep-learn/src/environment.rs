@@ -6,7 +6,8 @@
 
 use std::sync::Arc;
 
-use instep_kick::policy::{Follower, Track, TrackState};
+use instep_kick::policy::Follower;
+use instep_kick::track::{Track, TrackState};
 use instep_motion::reference::Reference;
 use instep_robot::control::{JointCommand, Sensors};
 use instep_robot::{Robot, RobotData};
@@ -14,10 +15,9 @@ use instep_sim::sensors::SensorSuite;
 use instep_sim::settings::{Step as StepSettings, WorldSettings};
 use instep_sim::trial::has_fallen;
 use instep_sim::{BallState, World};
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use rand_distr::StandardNormal;
 
 use crate::LearnError;
 use crate::reward::{self, Deviation};
@@ -244,15 +244,9 @@ impl Environment {
     /// When the world refuses the state.
     pub fn start(&mut self, tick: usize) -> Result<(), LearnError> {
         let scene = Arc::clone(&self.scene);
-        let settings = &scene.settings.start;
         let state = &scene.ticks[tick].state;
         let (mut q, mut v) = (state.q.clone(), state.v.clone());
-        let mut draw = |deviation: f64| deviation * self.rng.sample::<f64, _>(StandardNormal);
-        for (i, joint) in scene.robot.joints.iter().enumerate() {
-            q[7 + i] = (q[7 + i] + draw(settings.joint)).clamp(joint.range[0], joint.range[1]);
-            v[6 + i] += draw(settings.joint_speed);
-        }
-        v[..3].iter_mut().for_each(|v| *v += draw(settings.base_speed));
+        scene.settings.start.disturb(&scene.robot, &mut q, &mut v, &mut self.rng);
         let at = tick as f64 * scene.settings.follower.period;
         let track = self.follower.track();
         self.with_ball = scene.settings.world.ball && at + BALL_LEAD < track.contact_time();
@@ -264,7 +258,7 @@ impl Environment {
         (self.tick, self.started) = (tick, tick);
         self.last_action.fill(0.0);
         let (position, velocity) = (Vector3::new(q[0], q[1], q[2]), Vector3::new(v[0], v[1], v[2]));
-        self.follower.start(0.0, at, Isometry3::identity(), position, velocity);
+        self.follower.start(0.0, at, position, velocity);
         self.look();
         Ok(())
     }

@@ -10,9 +10,8 @@ use instep_robot::Robot;
 use instep_sim::settings::WorldSettings;
 use instep_sim::trial::{self, Trial, TrialSettings};
 use instep_sim::{BallState, World};
-use rand::{RngExt, SeedableRng};
+use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use rand_distr::StandardNormal;
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -143,17 +142,11 @@ pub fn kick(
     world: &mut World,
     seed: u64,
 ) -> Result<(TrialSettings, Trial), LearnError> {
-    let mut engine = PolicyKick::new(Arc::clone(robot), policy, evaluation.start)?;
+    let mut engine = PolicyKick::new(robot, policy, evaluation.start)?;
     let (mut q, mut v) = engine.initial_state();
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let errors = &evaluation.errors;
-    let mut draw = |deviation: f64| deviation * rng.sample::<f64, _>(StandardNormal);
-    for (i, joint) in robot.joints.iter().enumerate() {
-        q[7 + i] = (q[7 + i] + draw(errors.joint)).clamp(joint.range[0], joint.range[1]);
-        v[6 + i] += draw(errors.joint_speed);
-    }
-    v[..3].iter_mut().for_each(|v| *v += draw(errors.base_speed));
-    engine.begin();
+    errors.disturb(robot, &mut q, &mut v, &mut rng);
     let track = engine.follower().track();
     let (contact, end) = (track.contact_time(), track.duration() + errors.stand);
     let settings = TrialSettings {

@@ -194,6 +194,9 @@ impl Training {
     pub fn policy(&self) -> Policy {
         let weights = &self.ppo.weights;
         let follower = self.scene.follower();
+        // Nobody who runs the policy asks for the ground's forces: they would be a quarter of its file.
+        let mut reference = (*self.reference).clone();
+        reference.knots.iter_mut().for_each(|knot| knot.forces.clear());
         let layers = weights.actor.export(&weights.flat[weights.actor_part()]);
         let activation = self.scene.settings.network.activation;
         Policy {
@@ -206,7 +209,7 @@ impl Training {
                 activation,
                 steps: self.state.steps,
             },
-            reference: Arc::clone(&self.reference),
+            reference: Arc::new(reference),
             network: Network::new(self.rollout.moments.normalizer(), layers, activation),
         }
     }
