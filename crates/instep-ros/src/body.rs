@@ -5,10 +5,8 @@ use std::time::{Duration, Instant};
 
 use instep_robot::Robot;
 use instep_robot::control::{JointCommand, Sensors};
+use instep_sim::trial::FALLEN_TILT;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
-
-/// Tilt of the base link beyond which the robot counts as fallen, rad (as in the simulator's trials).
-const FALLEN: f64 = 1.05;
 
 /// Whether sensor readings can be used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -67,7 +65,7 @@ pub(crate) fn tilt(orientation: [f64; 4]) -> f64 {
 
 /// Whether an orientation is that of a fallen robot.
 pub(crate) fn fallen(orientation: [f64; 4]) -> bool {
-    tilt(orientation) > FALLEN
+    tilt(orientation) > FALLEN_TILT
 }
 
 /// What came over ROS last, and when (by our own clock: the senders' may differ).

@@ -11,10 +11,11 @@ use instep_robot::control::{JointCommand, Sensors};
 use instep_robot::{Robot, RobotData};
 use instep_sim::sensors::SensorSuite;
 use instep_sim::settings::WorldSettings;
+use instep_sim::trial::has_fallen;
 use instep_sim::{BallState, SimError, World};
 use nalgebra::{Rotation2, Vector2};
 
-use crate::body::{Body, Freshness, Whereabouts, fallen};
+use crate::body::{Body, Freshness, Whereabouts};
 
 /// How long a fallen robot lies before it is put back, s.
 const LIES: f64 = 1.0;
@@ -91,8 +92,7 @@ impl Body for SimBody {
             // A state that diverged cannot be gone on from; neither can the robot stay on the ground.
             let done = self.world.advance(command, None);
             self.suite.sense(&self.world);
-            let q = self.world.q();
-            let down = fallen([q[3], q[4], q[5], q[6]]) || self.world.body_touches_ground();
+            let down = has_fallen(&self.world);
             let now = self.world.time();
             let since = if down { *self.fell_at.get_or_insert(now) } else { now };
             if done.is_err() || now - since > LIES {

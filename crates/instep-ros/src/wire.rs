@@ -340,12 +340,12 @@ impl<F: Form> Wire<F> {
             }
             Err(refusal) if is_reach(&refusal) => {
                 self.state.counts.unreachable += 1;
-                self.log.warn(&format!("goal {} unreachable: {refusal}", short(&id)));
+                self.log.warn(&format!("goal {} unreachable: {}", short(&id), refusal.explain(&self.robot)));
                 self.state.goals.accept(id, now);
                 self.end(GoalState::Aborted, KickResult::UNREACHABLE);
                 Ok(())
             }
-            Err(refusal) => Err(refusal.to_string()),
+            Err(refusal) => Err(refusal.explain(&self.robot)),
         }
     }
 

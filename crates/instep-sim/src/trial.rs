@@ -17,7 +17,7 @@ use crate::settings::{Step, WorldSettings};
 use crate::world::{BallState, Snapshot, World};
 
 /// Tilt of the base link beyond which the robot counts as fallen, rad.
-const FALLEN_TILT: f64 = 1.05;
+pub const FALLEN_TILT: f64 = 1.05;
 /// Height of the base link, as a share of its standing height, below which the robot counts as fallen.
 const FALLEN_HEIGHT: f64 = 0.5;
 /// Load (N) above which a contact point of the support foot is expected not to slip.
