@@ -4,12 +4,11 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
 use instep_bench::table::{csv, json, markdown, rows};
 use instep_bench::{Bench as KickBench, BenchError, Scenario, Subject, page, table::rows_over_seeds};
 
 use crate::failure::Failure;
-use crate::output::Output;
+use crate::output::{self, Output};
 use crate::{files, places};
 
 /// The arguments of `instep bench`.
@@ -74,10 +73,7 @@ impl Bench {
         if self.resume.is_none() {
             std::fs::write(&kept, "").map_err(unusable)?;
         }
-        let bar = ProgressBar::new(bench.cells().len() as u64);
-        if let Ok(style) = ProgressStyle::with_template("{wide_bar} {pos}/{len} {msg} {eta}") {
-            bar.set_style(style);
-        }
+        let bar = output::bar(bench.cells().len() as u64, "{wide_bar} {pos}/{len} {msg} {eta}");
         let cells = bench.run(Some(&kept), &|done, _, key| {
             bar.set_position(done as u64);
             bar.set_message(format!("{} {} {}", key.engine, key.robot, key.scenario));

@@ -5,11 +5,10 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
 use instep_learn::evaluate::{Evaluation, Summary, evaluate};
 
 use crate::failure::Failure;
-use crate::output::{Output, Paint};
+use crate::output::{self, Output, Paint};
 use crate::{kick, places, train};
 
 /// The arguments of `instep eval`.
@@ -49,10 +48,7 @@ impl Eval {
         let world = self.world.as_deref().map(kick::world_settings).transpose()?.unwrap_or_default();
         let evaluation =
             Evaluation { trials: self.trials, seed: self.seed, start: self.start, world, ..Evaluation::default() };
-        let bar = ProgressBar::new(self.trials as u64);
-        if let Ok(style) = ProgressStyle::with_template("{wide_bar} {pos}/{len} trials {eta}") {
-            bar.set_style(style);
-        }
+        let bar = output::bar(self.trials as u64, "{wide_bar} {pos}/{len} trials {eta}");
         let summary = evaluate(&robot, &policy, &evaluation, &|| bar.inc(1))?;
         bar.finish_and_clear();
         output.show(&summary, |paint| text(&summary, paint))?;

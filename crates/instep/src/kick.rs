@@ -187,9 +187,8 @@ impl Kick {
         let reference_file = PathBuf::from(&policy.header.reference);
         let from = policy.header.window[0];
         let start = self.start.unwrap_or(from);
-        let mut engine = PolicyKick::new(Arc::clone(&robot), &policy, start - from)
+        let engine = PolicyKick::new(&robot, &policy, start - from)
             .map_err(|error| Failure::from(error).about(file.display()))?;
-        engine.begin();
         let (q, v) = engine.initial_state();
         Ok(Ready { robot, reference, reference_file, start, controller: Box::new(engine), q, v })
     }
@@ -214,11 +213,7 @@ impl Kick {
 
 /// Reads and checks the constants of the world.
 pub(crate) fn world_settings(path: &Path) -> Result<WorldSettings, Failure> {
-    places::existing_file("--world", path, "constants of the world (TOML)")?;
-    let text = std::fs::read_to_string(path)
-        .map_err(|e| Failure::input(format!("{}: cannot be read: {e}; expected TOML", path.display())))?;
-    let settings: WorldSettings = toml::from_str(&text)
-        .map_err(|e| Failure::input(format!("{}: {}", path.display(), e.to_string().trim_end())))?;
+    let settings: WorldSettings = places::settings("--world", path, "constants of the world")?;
     settings.validate().map_err(|e| Failure::from(e).about(path.display()))?;
     Ok(settings)
 }

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 use instep_learn::evaluate::{Evaluation, evaluate};
 use instep_learn::train::{Progress, Training};
 use instep_learn::{LearnError, LearnSettings, checkpoint};
@@ -15,7 +15,7 @@ use instep_report::{Axis, Column, Plot, Report, Series, Table};
 use serde::Serialize;
 
 use crate::failure::Failure;
-use crate::output::Output;
+use crate::output::{self, Output};
 use crate::{files, places, train};
 
 /// The kinds of reference: name in the table, shipped file, paper 1's link error without and with early termination, m.
@@ -90,10 +90,10 @@ impl LearnTable {
         }
         std::fs::create_dir_all(&self.out)
             .map_err(|e| Failure::input(format!("{}: cannot be made: {e} (--out)", self.out.display())))?;
-        let bar = ProgressBar::new(KINDS.len() as u64 * 2 * self.seeds * self.budget);
-        if let Ok(style) = ProgressStyle::with_template("{wide_bar} {human_pos}/{human_len} steps, {msg} {eta}") {
-            bar.set_style(style);
-        }
+        let bar = output::bar(
+            KINDS.len() as u64 * 2 * self.seeds * self.budget,
+            "{wide_bar} {human_pos}/{human_len} steps, {msg} {eta}",
+        );
         let mut rows = Vec::new();
         for (kind, file, without, with) in KINDS {
             for ret in [false, true] {

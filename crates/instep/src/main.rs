@@ -10,6 +10,7 @@ mod eval;
 mod failure;
 mod figure;
 mod files;
+mod interrupt;
 mod kick;
 mod learn_table;
 mod mujoco_log;

@@ -4,10 +4,21 @@
 
 use std::io::{IsTerminal, Write};
 
+use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
 use crate::failure::Failure;
 use crate::mujoco_log;
+
+/// A progress bar of `length` steps on standard error; hidden where nobody watches.
+pub(crate) fn bar(length: u64, template: &str) -> ProgressBar {
+    let bar = ProgressBar::new(length);
+    // A template of ours that cannot be read is shown as the library's own.
+    if let Ok(style) = ProgressStyle::with_template(template) {
+        bar.set_style(style);
+    }
+    bar
+}
 
 /// How to speak to the user.
 #[derive(Debug, Clone, Copy)]

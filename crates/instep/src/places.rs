@@ -4,6 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use instep_robot::Robot;
+use serde::de::DeserializeOwned;
 
 use crate::failure::Failure;
 
@@ -34,6 +35,17 @@ pub(crate) fn existing_file(flag: &str, path: &Path, what: &str) -> Result<PathB
         Err(error) => format!("cannot be read: {error}"),
     };
     Err(Failure::input(format!("{}: {found}; expected {what} ({flag})", path.display())))
+}
+
+/// What `flag` names as a TOML file; `what` says what kind of settings it holds. Their ranges are not checked.
+///
+/// # Errors
+/// When it cannot be read, or is not what it should be: with line and column.
+pub(crate) fn settings<T: DeserializeOwned>(flag: &str, path: &Path, what: &str) -> Result<T, Failure> {
+    existing_file(flag, path, &format!("{what} (TOML)"))?;
+    let text = std::fs::read_to_string(path)
+        .map_err(|e| Failure::input(format!("{}: cannot be read: {e}; expected TOML", path.display())))?;
+    toml::from_str(&text).map_err(|e| Failure::input(format!("{}: {}", path.display(), e.to_string().trim_end())))
 }
 
 /// The reference that the user means: a path, or one of the shipped ones as `references/<robot>/<name>.json`.

@@ -10,8 +10,6 @@ mod summary;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 
 use clap::{Args, ValueEnum};
 use instep_motion::asf;
@@ -24,14 +22,12 @@ use instep_robot::Robot;
 use serde::Deserialize;
 
 use crate::failure::Failure;
+use crate::interrupt::{INTERRUPTED, stopped_by_the_user};
 use crate::kick::{degrees, point};
 use crate::output::Output;
 use crate::{files, places};
 use measures::Measures;
 use progress::Line;
-
-/// The code of a program that Ctrl-C ended.
-const INTERRUPTED: u8 = 130;
 
 /// The arguments of `instep retarget`.
 #[derive(Debug, Args)]
@@ -190,13 +186,7 @@ impl Retarget {
     fn settings(&self) -> Result<Settings, Failure> {
         let mut settings: Settings = match &self.settings {
             None => Settings::default(),
-            Some(path) => {
-                places::existing_file("--settings", path, "settings of retargeting (TOML)")?;
-                let text = std::fs::read_to_string(path)
-                    .map_err(|e| Failure::input(format!("{}: cannot be read: {e}; expected TOML", path.display())))?;
-                toml::from_str(&text)
-                    .map_err(|e| Failure::input(format!("{}: {}", path.display(), e.to_string().trim_end())))?
-            }
+            Some(path) => places::settings("--settings", path, "settings of retargeting")?,
         };
         let goes_on = self.stage == Stage::Kinodynamic;
         if goes_on && self.form == Form::Slip {
@@ -283,19 +273,6 @@ impl Retarget {
         };
         failure.in_stage(stage)
     }
-}
-
-/// A flag that Ctrl-C or a request to terminate raises; a second Ctrl-C ends the program at once.
-pub(crate) fn stopped_by_the_user() -> Arc<AtomicBool> {
-    let stop = Arc::new(AtomicBool::new(false));
-    let raised = Arc::clone(&stop);
-    // Without a handler Ctrl-C ends the program, as it would anyway.
-    let _ = ctrlc::set_handler(move || {
-        if raised.swap(true, std::sync::atomic::Ordering::Relaxed) {
-            std::process::exit(i32::from(INTERRUPTED));
-        }
-    });
-    stop
 }
 
 impl Done {

@@ -10,10 +10,10 @@ use instep_ros::form::{Dynamic, Form2026};
 use instep_ros::{Level, Mapping, Network, Node, Report, Settings, Simulation};
 
 use crate::failure::Failure;
+use crate::interrupt::stopped_by_the_user;
 use crate::kick::point;
 use crate::output::Output;
 use crate::places;
-use crate::retarget::stopped_by_the_user;
 
 /// How long a sensor of a real robot may be silent before the foot is brought down, s.
 const PATIENCE: f64 = 0.1;

@@ -3,11 +3,10 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
-use indicatif::{ProgressBar, ProgressStyle};
 use instep_kick::policy::Policy;
 use instep_learn::termination::EndRow;
 use instep_learn::train::{Progress, Training};
@@ -17,7 +16,8 @@ use instep_report::{Axis, Column, Plot, Report, Series, SummaryItem, Table, Verd
 use serde::Serialize;
 
 use crate::failure::Failure;
-use crate::output::{Output, Paint};
+use crate::interrupt::stopped_by_the_user;
+use crate::output::{self, Output, Paint};
 use crate::{files, places};
 
 /// Time between two checkpoints, s.
@@ -130,14 +130,8 @@ impl Train {
         std::fs::create_dir_all(&self.out)
             .map_err(|e| Failure::input(format!("{}: cannot be made: {e} (--out)", self.out.display())))?;
 
-        let stop = Arc::new(AtomicBool::new(false));
-        let flag = Arc::clone(&stop);
-        // Without a handler Ctrl-C ends the program at once; then the last checkpoint is at most a minute old.
-        let _ = ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed));
-        let bar = ProgressBar::new(training.state.budget);
-        if let Ok(style) = ProgressStyle::with_template("{wide_bar} {human_pos}/{human_len} steps, {msg} {eta}") {
-            bar.set_style(style);
-        }
+        let stop = stopped_by_the_user();
+        let bar = output::bar(training.state.budget, "{wide_bar} {human_pos}/{human_len} steps, {msg} {eta}");
         let (start, before) = (Instant::now(), training.state.steps);
         let mut saved = Instant::now();
         let mut failed = None;
@@ -263,11 +257,7 @@ pub(crate) fn threads(count: Option<usize>) -> Result<(), Failure> {
 
 /// Reads the settings of a training.
 pub(crate) fn settings(path: &Path) -> Result<LearnSettings, Failure> {
-    places::existing_file("--settings", path, "settings of a training (TOML)")?;
-    let text = std::fs::read_to_string(path)
-        .map_err(|e| Failure::input(format!("{}: cannot be read: {e}; expected TOML", path.display())))?;
-    let settings: LearnSettings = toml::from_str(&text)
-        .map_err(|e| Failure::input(format!("{}: {}", path.display(), e.to_string().trim_end())))?;
+    let settings: LearnSettings = places::settings("--settings", path, "settings of a training")?;
     settings.validate().map_err(|e| Failure::from(e).about(path.display()))?;
     Ok(settings)
 }
