@@ -1,56 +1,76 @@
 //! The engines that KickBench knows, by name, and what it needs to know of a robot.
 
-use std::path::Path;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use instep_kick::KickEngine;
 use instep_kick::dynamic::{DynamicKick, DynamicSettings};
+use instep_kick::{BallModel, KickEngine};
 use instep_robot::Robot;
 use instep_sim::settings::{Ball, WorldSettings};
 
 use crate::BenchError;
 use crate::scenario::Size;
 
-/// Names of the engines: `dynamic`, and the same with its closed loop off.
-pub const ENGINES: [&str; 2] = ["dynamic", "dynamic-open"];
+/// An engine that was made for a robot, or why not.
+type Made = Result<Box<dyn KickEngine + Send>, BenchError>;
+
+/// An engine, or one that differs from another in a setting.
+struct Entry {
+    name: &'static str,
+    /// Its settings' file in a robot's folder.
+    file: &'static str,
+    /// Makes it from the text of that file.
+    make: fn(&Subject, &str) -> Made,
+}
+
+/// Every engine: one line each.
+const ENTRIES: &[Entry] = &[
+    Entry { name: "dynamic", file: "dynamic.toml", make: |subject, text| subject.dynamic(text, |_| ()) },
+    Entry {
+        name: "dynamic-open",
+        file: "dynamic.toml",
+        make: |subject, text| subject.dynamic(text, |settings| settings.feedback.on = false),
+    },
+];
+
+/// Names of the engines; `dynamic-open` is `dynamic` with its closed loop off.
+pub fn engines() -> impl Iterator<Item = &'static str> {
+    ENTRIES.iter().map(|entry| entry.name)
+}
 
 /// A robot with what its trials share.
 #[derive(Debug, Clone)]
 pub struct Subject {
     /// The robot.
     pub robot: Arc<Robot>,
-    /// The dynamic engine's settings.
-    pub dynamic: DynamicSettings,
-    /// Its size and its ball.
+    /// The ball that it plays.
+    pub ball: BallModel,
+    /// Its size and its ball's.
     pub size: Size,
     /// The footprint's origin in the world when the robot stands, m.
     pub footprint: [f64; 2],
+    folder: PathBuf,
+    /// Settings of the engines by their file's name, where they are not those of the folder.
+    settings: BTreeMap<&'static str, String>,
 }
 
 impl Subject {
     /// Loads `name` from the folder of robots.
     ///
     /// # Errors
-    /// When the robot or its engine's settings cannot be read.
+    /// As [`Subject::of`], or when the robot cannot be read.
     pub fn load(robots: &Path, name: &str) -> Result<Self, BenchError> {
-        let folder = robots.join(name);
-        let robot = Arc::new(Robot::load(&folder)?);
-        let dynamic = DynamicSettings::load(&folder)?;
-        Ok(Self::new(robot, dynamic))
+        Self::of(Robot::load(&robots.join(name))?)
     }
 
-    /// For a loaded robot, with the engine's settings from its folder.
+    /// For a loaded robot, with the ball of its folder.
     ///
     /// # Errors
-    /// When the engine's settings cannot be read.
+    /// When the ball cannot be read.
     pub fn of(robot: Robot) -> Result<Self, BenchError> {
-        let dynamic = DynamicSettings::load(robot.model_file().parent().unwrap_or(Path::new(".")))?;
-        Ok(Self::new(Arc::new(robot), dynamic))
-    }
-
-    /// For a robot and its settings.
-    #[must_use]
-    pub fn new(robot: Arc<Robot>, dynamic: DynamicSettings) -> Self {
+        let folder = robot.model_file().parent().unwrap_or(Path::new(".")).to_owned();
+        let ball = BallModel::load(&folder)?;
         let data = robot.data();
         let [left, right] = [0, 1].map(|side| data.point(&robot.legs[side].sole));
         let middle = 0.5 * (left + right);
@@ -67,20 +87,60 @@ impl Subject {
             leg: length(leg.thigh, leg.shank) + length(leg.shank, leg.foot) - leg.sole.point.z.min(0.0),
             half_width: 0.5 * (left.y - right.y).abs(),
             toes,
-            ball: dynamic.ball.radius,
-            deceleration: dynamic.ball.deceleration,
+            ball: ball.radius,
+            deceleration: ball.deceleration,
         };
-        Self { robot, dynamic, size, footprint: [middle.x, middle.y] }
+        let footprint = [middle.x, middle.y];
+        Ok(Self { robot: Arc::new(robot), ball, size, footprint, folder, settings: BTreeMap::new() })
+    }
+
+    /// The file that holds the settings of the engine called `name` for this robot.
+    ///
+    /// # Errors
+    /// When there is no such engine.
+    pub fn settings_file(&self, name: &str) -> Result<PathBuf, BenchError> {
+        Ok(self.folder.join(entry(name)?.file))
+    }
+
+    /// Whether the engine called `name` has settings for this robot.
+    #[must_use]
+    pub fn knows(&self, name: &str) -> bool {
+        self.settings(name).is_ok()
+    }
+
+    /// The text of the settings of the engine called `name`: TOML.
+    ///
+    /// # Errors
+    /// When there is no such engine, or none for this robot.
+    pub fn settings(&self, name: &str) -> Result<String, BenchError> {
+        let entry = entry(name)?;
+        if let Some(text) = self.settings.get(entry.file) {
+            return Ok(text.clone());
+        }
+        let file = self.folder.join(entry.file);
+        if !file.exists() {
+            let robot = self.robot.name.clone();
+            return Err(BenchError::NotForRobot { engine: name.into(), robot, file: file.display().to_string() });
+        }
+        std::fs::read_to_string(&file)
+            .map_err(|e| BenchError::File { file: file.display().to_string(), detail: e.to_string() })
+    }
+
+    /// The same robot with other settings, the text of a TOML file, for the engine called `name` and those that share its file.
+    ///
+    /// # Errors
+    /// When there is no such engine.
+    pub fn with_settings(mut self, name: &str, text: String) -> Result<Self, BenchError> {
+        self.settings.insert(entry(name)?.file, text);
+        Ok(self)
     }
 
     /// The world's constants for this robot's ball.
     #[must_use]
     pub fn world(&self) -> WorldSettings {
-        let mut world = WorldSettings {
-            ball: Ball { mass: self.dynamic.ball.mass, radius: self.dynamic.ball.radius },
-            ..WorldSettings::default()
-        };
-        world.pitch.rolling_deceleration = self.dynamic.ball.deceleration;
+        let mut world =
+            WorldSettings { ball: Ball { mass: self.ball.mass, radius: self.ball.radius }, ..WorldSettings::default() };
+        world.pitch.rolling_deceleration = self.ball.deceleration;
         // Feet of these robots pass the ball at under 3 m/s: more than twice that times the far step. A light ball needs
         // a finer near step than the default for the audit's 2 %.
         world.step.near_distance = 0.02;
@@ -91,16 +151,23 @@ impl Subject {
     /// The engine called `name`.
     ///
     /// # Errors
-    /// When there is none, or it does not fit the robot.
-    pub fn engine(&self, name: &str) -> Result<Box<dyn KickEngine + Send>, BenchError> {
-        let mut settings = self.dynamic.clone();
-        match name {
-            "dynamic" => {}
-            "dynamic-open" => settings.feedback.on = false,
-            _ => {
-                return Err(BenchError::Unknown { kind: "engine", found: name.into(), known: ENGINES.join(", ") });
-            }
-        }
-        Ok(Box::new(DynamicKick::new(Arc::clone(&self.robot), settings)?))
+    /// When there is none, or its settings do not fit the robot.
+    pub fn engine(&self, name: &str) -> Made {
+        (entry(name)?.make)(self, &self.settings(name)?)
     }
+
+    fn dynamic(&self, text: &str, change: fn(&mut DynamicSettings)) -> Made {
+        let file = self.folder.join("dynamic.toml").display().to_string();
+        let mut settings = DynamicSettings::parse(&file, text)?;
+        change(&mut settings);
+        Ok(Box::new(DynamicKick::new(Arc::clone(&self.robot), self.ball, settings)?))
+    }
+}
+
+fn entry(name: &str) -> Result<&'static Entry, BenchError> {
+    ENTRIES.iter().find(|entry| entry.name == name).ok_or_else(|| BenchError::Unknown {
+        kind: "engine",
+        found: name.into(),
+        known: engines().collect::<Vec<_>>().join(", "),
+    })
 }

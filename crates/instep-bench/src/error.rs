@@ -33,6 +33,16 @@ pub enum BenchError {
         /// What there is.
         known: String,
     },
+    /// An engine that has no settings for a robot.
+    #[error("engine {engine} does not know {robot}; expected its settings in {file}")]
+    NotForRobot {
+        /// The engine.
+        engine: String,
+        /// The robot.
+        robot: String,
+        /// Where they would be.
+        file: String,
+    },
     /// The world refused.
     #[error(transparent)]
     Sim(#[from] instep_sim::SimError),

@@ -18,7 +18,7 @@ pub mod run;
 pub mod scenario;
 pub mod table;
 
-pub use engines::{ENGINES, Subject};
+pub use engines::{Subject, engines};
 pub use error::BenchError;
 pub use run::Bench;
 pub use scenario::Scenario;

@@ -29,13 +29,15 @@ pub struct Bench {
 }
 
 impl Bench {
-    /// Every cell, in the table's order.
-    #[must_use]
-    pub fn cells(&self) -> Vec<CellKey> {
+    /// Every cell, in the table's order: each robot with those of the engines that know it.
+    ///
+    /// # Errors
+    /// When an engine's settings cannot be read.
+    pub fn cells(&self) -> Result<Vec<CellKey>, BenchError> {
         let mut cells = Vec::new();
         for subject in &self.subjects {
             for scenario in &self.scenarios {
-                for engine in &self.engines {
+                for engine in self.engines.iter().filter(|engine| subject.knows(engine)) {
                     for &seed in &self.seeds {
                         cells.push(CellKey {
                             engine: engine.clone(),
@@ -43,13 +45,13 @@ impl Bench {
                             scenario: scenario.name.clone(),
                             seed,
                             requests: self.requests,
-                            fingerprint: fingerprint(subject, scenario),
+                            fingerprint: fingerprint(subject, scenario, engine)?,
                         });
                     }
                 }
             }
         }
-        cells
+        Ok(cells)
     }
 
     /// Runs every cell that `resume` does not hold yet; finished cells are added to that file, one JSON object a line.
@@ -62,7 +64,7 @@ impl Bench {
         resume: Option<&Path>,
         progress: &(dyn Fn(usize, usize, &CellKey) + Sync),
     ) -> Result<Vec<CellResult>, BenchError> {
-        let cells = self.cells();
+        let cells = self.cells()?;
         let mut known: BTreeMap<CellKey, CellResult> = BTreeMap::new();
         let mut file = None;
         if let Some(path) = resume {
@@ -112,9 +114,13 @@ impl Bench {
     }
 }
 
-/// FNV-1a over what a cell's result depends on, besides the program.
-fn fingerprint(subject: &Subject, scenario: &Scenario) -> u64 {
+/// FNV-1a over what a cell's result depends on, besides the program. Comments in settings do not count.
+fn fingerprint(subject: &Subject, scenario: &Scenario, engine: &str) -> Result<u64, BenchError> {
     let robot = &subject.robot;
-    let text = format!("{:?} {:?} {:?} {:?} {scenario:?}", robot.joints, robot.stand, robot.mass(), subject.dynamic);
-    text.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
+    let settings = subject.settings(engine)?;
+    let settings = settings.parse::<toml::Table>().map_or(settings, |table| table.to_string());
+    let (joints, stand, mass) = (&robot.joints, &robot.stand, robot.mass());
+    let text = format!("{joints:?} {stand:?} {mass:?} {:?} {settings} {scenario:?}", subject.ball);
+    let mix = |hash: u64, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
+    Ok(text.bytes().fold(0xcbf2_9ce4_8422_2325, mix))
 }

@@ -1,6 +1,7 @@
 //! Kick engines: what turns a request and sensor readings into joint commands, so that a ball is kicked.
 //!
 //! - [`request`]: what is asked, and the causes of a refusal; [`dialect`]: the request formats that teams already send.
+//! - [`ball`]: the ball that a robot plays.
 //! - [`engine`]: the trait that every engine implements.
 //! - [`dynamic`]: paper 2's engine: splines of foot and trunk in the support foot's frame, stabilised by the centre of
 //!   pressure.
@@ -10,6 +11,7 @@
 //!
 //! An engine sees sensors, never the simulator's truth, and allocates nothing in a tick.
 
+pub mod ball;
 pub mod dialect;
 pub mod dynamic;
 pub mod engine;
@@ -22,6 +24,7 @@ pub mod request;
 pub mod track;
 pub mod tree;
 
+pub use ball::BallModel;
 pub use engine::{Face, KickEngine, KickPlan, KickStatus, Phase, Progress};
 pub use error::KickError;
 pub use playback::Playback;

@@ -275,6 +275,7 @@ impl Environment {
         let settings = &scene.settings;
         self.follower.act(action);
         let substeps = (settings.follower.period / settings.world.step).round() as usize;
+        let mut excess: f64 = 0.0;
         for k in 0..substeps {
             if k > 0 {
                 self.suite.read_into(self.world.time(), &mut self.sensors);
@@ -285,6 +286,7 @@ impl Environment {
                 return Step { reward: 0.0, deviation: Deviation::default(), end: Some(End::Diverged) };
             }
             self.suite.sense(&self.world);
+            excess = excess.max(reward::excess_speed(&scene.robot.joints, &self.world.v()[6..]));
         }
         self.tick += 1;
         self.look();
@@ -297,6 +299,7 @@ impl Environment {
         let rate: f64 = action.iter().zip(&self.last_action).map(|(a, b)| square(a - b)).sum();
         reward -= weights.w_rate * rate / n;
         reward -= weights.w_action * action.iter().map(|&a| square(a)).sum::<f64>() / n;
+        reward -= weights.w_limit * excess;
         self.last_action.copy_from_slice(action);
         if self.with_ball && weights.w_ball > 0.0 {
             let velocity = Vector3::from(self.world.ball().velocity);

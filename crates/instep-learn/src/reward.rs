@@ -1,5 +1,6 @@
 //! The rewards of paper 1, equations (34) to (38).
 
+use instep_robot::Joint;
 use nalgebra::Vector3;
 
 use crate::settings::RewardSettings;
@@ -19,6 +20,16 @@ pub struct Deviation {
     pub links: f64,
     /// The greatest of them, m, and its link: the measure of (39).
     pub farthest: (f64, usize),
+}
+
+/// Share of its speed limit beyond which a joint's speed is penalised.
+pub const CLOSE_TO_LIMIT: f64 = 0.95;
+
+/// How far the joint speeds `v` (rad/s, n) are beyond [`CLOSE_TO_LIMIT`]: the sum over the joints of the excess, each
+/// in shares of its limit.
+#[must_use]
+pub fn excess_speed(joints: &[Joint], v: &[f64]) -> f64 {
+    joints.iter().zip(v).map(|(joint, v)| (v.abs() / joint.speed - CLOSE_TO_LIMIT).max(0.0)).sum()
 }
 
 /// Imitation reward (34), between 0 and 1.
@@ -58,6 +69,17 @@ mod tests {
         ] {
             assert!(imitation(&settings, &deviation) < 1.0, "{deviation:?}");
         }
+    }
+
+    #[test]
+    fn only_what_a_joint_is_beyond_its_limit_counts() {
+        let robots = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots");
+        let robot = instep_robot::Robot::load(&robots.join("nao")).unwrap();
+        let mut v: Vec<f64> = robot.joints.iter().map(|joint| -0.94 * joint.speed).collect();
+        assert_eq!(excess_speed(&robot.joints, &v), 0.0);
+        v[0] = 1.05 * robot.joints[0].speed;
+        v[3] = -1.25 * robot.joints[3].speed;
+        assert!((excess_speed(&robot.joints, &v) - 0.4).abs() < 1e-12);
     }
 
     #[test]

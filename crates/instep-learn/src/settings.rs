@@ -67,6 +67,9 @@ pub struct RewardSettings {
     pub w_rate: f64,
     /// Penalty on the mean square of the action; not in the paper, zero turns it off.
     pub w_action: f64,
+    /// Penalty on joint speeds beyond [`CLOSE_TO_LIMIT`](crate::reward::CLOSE_TO_LIMIT), which a landing can drive past
+    /// what the motor gives; not in the paper, zero turns it off.
+    pub w_limit: f64,
     /// w_ball of (38), per step after the kick; zero while only tracking.
     pub w_ball: f64,
     /// Speed that the exponent of (38) is divided by, m/s. The paper has 1, which at 11 m/s is e^11 a step.
@@ -90,6 +93,7 @@ impl Default for RewardSettings {
             k_c: -8.0,
             w_rate: 0.02,
             w_action: 0.005,
+            w_limit: 1.0,
             w_ball: 0.0,
             ball_scale: 10.0,
             ball_cap: 16.0,
@@ -300,6 +304,7 @@ impl LearnSettings {
             ("w_c", reward.w_c),
             ("w_rate", reward.w_rate),
             ("w_action", reward.w_action),
+            ("w_limit", reward.w_limit),
             ("w_ball", reward.w_ball),
             ("ball_across", reward.ball_across),
         ] {

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 use instep_bench::table::{csv, json, markdown, rows};
-use instep_bench::{Bench as KickBench, BenchError, Scenario, Subject, page, table::rows_over_seeds};
+use instep_bench::{Bench as KickBench, BenchError, Scenario, Subject, engines, page, table::rows_over_seeds};
 
 use crate::failure::Failure;
 use crate::output::{self, Output};
@@ -14,8 +14,8 @@ use crate::{files, places};
 /// The arguments of `instep bench`.
 #[derive(Debug, Args)]
 pub(crate) struct Bench {
-    /// Engines, separated by commas
-    #[arg(long, value_name = "ENGINE", value_delimiter = ',', default_value = "dynamic,dynamic-open")]
+    /// Engines, separated by commas [default: all]
+    #[arg(long, value_name = "ENGINE", value_delimiter = ',')]
     engine: Vec<String>,
     /// Robots, separated by commas
     #[arg(long, value_name = "ROBOT", value_delimiter = ',', default_value = "nao,wolfgang")]
@@ -73,7 +73,7 @@ impl Bench {
         if self.resume.is_none() {
             std::fs::write(&kept, "").map_err(unusable)?;
         }
-        let bar = output::bar(bench.cells().len() as u64, "{wide_bar} {pos}/{len} {msg} {eta}");
+        let bar = output::bar(bench.cells()?.len() as u64, "{wide_bar} {pos}/{len} {msg} {eta}");
         let cells = bench.run(Some(&kept), &|done, _, key| {
             bar.set_position(done as u64);
             bar.set_message(format!("{} {} {}", key.engine, key.robot, key.scenario));
@@ -118,8 +118,20 @@ impl Bench {
             .iter()
             .map(|name| Ok(Subject::of(places::robot(name)?)?))
             .collect::<Result<Vec<_>, Failure>>()?;
-        for (subject, engine) in subjects.iter().flat_map(|s| self.engine.iter().map(move |e| (s, e))) {
-            subject.engine(engine)?;
+        let known: Vec<String> = engines().map(str::to_owned).collect();
+        let asked = if self.engine.is_empty() { known } else { self.engine.clone() };
+        for engine in &asked {
+            let (mut known, mut unknown) = (false, None);
+            for subject in &subjects {
+                match subject.engine(engine) {
+                    Err(error @ BenchError::NotForRobot { .. }) => unknown = Some(error),
+                    Err(error) => return Err(error.into()),
+                    Ok(_) => known = true,
+                }
+            }
+            if let Some(error) = unknown.filter(|_| !known && !self.engine.is_empty()) {
+                return Err(error.into());
+            }
         }
         let (requests, seeds) = if self.quick { (20, 1) } else { (200, 3) };
         let (requests, seeds) = (self.requests.unwrap_or(requests), self.seeds.unwrap_or(seeds));
@@ -128,6 +140,6 @@ impl Bench {
                 return Err(Failure::input(format!("{option}: {number}; expected a number from 1 to 1000000")));
             }
         }
-        Ok(KickBench { engines: self.engine.clone(), subjects, scenarios, seeds: (1..=seeds).collect(), requests })
+        Ok(KickBench { engines: asked, subjects, scenarios, seeds: (1..=seeds).collect(), requests })
     }
 }

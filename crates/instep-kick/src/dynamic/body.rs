@@ -8,6 +8,7 @@ use instep_robot::Robot;
 use nalgebra::{Rotation3, Vector3};
 
 use crate::KickError;
+use crate::ball::BallModel;
 use crate::dynamic::foot::Foot;
 use crate::tree::Tree;
 
@@ -30,6 +31,7 @@ pub(crate) struct Stand {
 #[derive(Debug)]
 pub(crate) struct Body {
     pub(crate) robot: Arc<Robot>,
+    pub(crate) ball: BallModel,
     pub(crate) tree: Tree,
     /// Left foot, right foot.
     pub(crate) feet: [Foot; 2],
@@ -46,7 +48,7 @@ pub(crate) struct Body {
 }
 
 impl Body {
-    pub(crate) fn new(robot: Arc<Robot>, wanted: &BTreeMap<String, f64>) -> Result<Self, KickError> {
+    pub(crate) fn new(robot: Arc<Robot>, ball: BallModel, wanted: &BTreeMap<String, f64>) -> Result<Self, KickError> {
         let tree = Tree::new(&robot);
         let mut pose = tree.pose();
         let angles = robot.stand[7..].to_vec();
@@ -90,7 +92,7 @@ impl Body {
                 Ok((joint, angles[joint], angle))
             })
             .collect::<Result<_, _>>()?;
-        Ok(Self { robot, tree, feet, stands, angles, arms, half_width, leg_length })
+        Ok(Self { robot, ball, tree, feet, stands, angles, arms, half_width, leg_length })
     }
 
     /// Sets the joints that are no leg's: `share` 0 is the stand, 1 the foot up.

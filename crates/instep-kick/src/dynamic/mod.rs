@@ -27,6 +27,7 @@ use instep_robot::control::{Controller, JointCommand, Sensors};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use crate::KickError;
+use crate::ball::BallModel;
 use crate::engine::{KickEngine, KickPlan, KickStatus, Phase, Progress};
 use crate::ik::Ik;
 use crate::request::{KickRequest, Refusal};
@@ -38,7 +39,7 @@ use motion::{Motion, Stroke};
 use plan::Planner;
 use torque::Dynamics;
 
-pub use settings::{Accuracy, BallModel, DynamicSettings, Feedback, Limits, Pid, Stance, Swing, Times};
+pub use settings::{Accuracy, DynamicSettings, Feedback, Limits, Pid, Stance, Swing, Times};
 
 /// Steps of inverse kinematics in a tick.
 const TICK_STEPS: usize = 3;
@@ -89,12 +90,12 @@ impl DynamicKick {
     ///
     /// # Errors
     /// When a setting cannot be or does not fit the robot.
-    pub fn new(robot: Arc<Robot>, settings: DynamicSettings) -> Result<Self, KickError> {
+    pub fn new(robot: Arc<Robot>, ball: BallModel, settings: DynamicSettings) -> Result<Self, KickError> {
         settings.validate()?;
         let ik = Ik::new(&robot, &settings.coupled, settings.limits.joint_margin, settings.limits.knee_bend)?;
         let coupled: Vec<[usize; 2]> =
             settings.coupled.iter().filter_map(|[a, b]| Some([robot.joint_index(a)?, robot.joint_index(b)?])).collect();
-        let body = Body::new(Arc::clone(&robot), &settings.arms)?;
+        let body = Body::new(Arc::clone(&robot), ball, &settings.arms)?;
         let planner = Planner::new(&body, &settings, ik.clone(), Dynamics::new(&robot, coupled.clone()));
         let motion = Motion::standing(&body, Side::Right);
         let mut pose = body.tree.pose();
@@ -130,20 +131,26 @@ impl DynamicKick {
         })
     }
 
-    /// The engine for `robot` with the settings in its folder.
+    /// The engine for `robot` with the ball and the settings in its folder.
     ///
     /// # Errors
-    /// As [`DynamicSettings::load`] and [`DynamicKick::new`].
+    /// As [`BallModel::load`], [`DynamicSettings::load`] and [`DynamicKick::new`].
     pub fn load(robot: Arc<Robot>) -> Result<Self, KickError> {
         let folder = robot.model_file().parent().unwrap_or(std::path::Path::new(".")).to_owned();
         let settings = DynamicSettings::load(&folder)?;
-        Self::new(robot, settings)
+        Self::new(robot, BallModel::load(&folder)?, settings)
     }
 
     /// Its settings.
     #[must_use]
     pub fn settings(&self) -> &DynamicSettings {
         &self.settings
+    }
+
+    /// The ball that it plays.
+    #[must_use]
+    pub fn ball(&self) -> &BallModel {
+        &self.body.ball
     }
 
     /// Where the base link's ground projection is in the footprint frame while the robot stands, m: turns a

@@ -137,8 +137,8 @@ impl Planner {
         time: f64,
         whole: bool,
     ) -> Result<Planned, Refusal> {
-        let (ball, velocity) = roll(request.ball, request.ball_velocity, settings.ball.deceleration, time);
-        check_place(body, settings, ball)?;
+        let (ball, velocity) = body.ball.roll(request.ball, request.ball_velocity, time);
+        check_place(body, ball)?;
         let mut candidates: [Option<Candidate>; 12] = [None; 12];
         let mut refusal: Option<Refusal> = None;
         let mut count = 0;
@@ -208,8 +208,8 @@ impl Planner {
         let ball_velocity = Vector2::from(velocity);
         let wanted_speed = |mass: f64| match request.strength {
             Strength::BallSpeed(v) => v,
-            Strength::FootSpeed(v) => v * gain(settings, mass),
-            Strength::Distance(d) => (2.0 * settings.ball.deceleration * d).sqrt(),
+            Strength::FootSpeed(v) => v * body.ball.gain(mass),
+            Strength::Distance(d) => (2.0 * body.ball.deceleration * d).sqrt(),
         };
         let aim = Vector2::new(request.direction.cos(), request.direction.sin()) * wanted_speed(1.0) - ball_velocity;
         let direction = if ball_velocity.norm() > 0.02 { aim.y.atan2(aim.x) } else { request.direction };
@@ -227,9 +227,9 @@ impl Planner {
         if yaw.abs() > s.yaw || (face == Face::Corner && !corner_range) {
             return None;
         }
-        let height = (settings.ball.radius + s.height - point.axis.z).max(s.sole_least);
+        let height = (body.ball.radius + s.height - point.axis.z).max(s.sole_least);
         let center = Vector2::from(body.support_from_footprint(swing, ball));
-        let contact = contact_point(center, direction, &point, yaw, height, settings.ball.radius);
+        let contact = contact_point(center, direction, &point, yaw, height, body.ball.radius);
         let mut stroke = Stroke {
             swing,
             face,
@@ -260,7 +260,7 @@ impl Planner {
         let change =
             (Vector2::new(request.direction.cos(), request.direction.sin()) * ball_speed - ball_velocity).norm();
         let along = ball_velocity.dot(&toward.xy());
-        stroke.speed = (change / gain(settings, mass) * settings.ball.speed_gain + along).max(0.1);
+        stroke.speed = (change / body.ball.gain(mass) * s.speed_gain + along).max(0.1);
         let ahead = 0.01;
         let beyond = self.reach(body, settings, &stroke, stroke.pose(ahead), Place::Contact, NEAR);
         let share = body
@@ -443,27 +443,10 @@ impl Planner {
     }
 }
 
-/// Ball speed over foot speed for an effective mass (kg) of the foot (facts/physics-of-the-kick.md).
-fn gain(settings: &DynamicSettings, mass: f64) -> f64 {
-    (1.0 + settings.ball.restitution) * mass / (mass + settings.ball.mass)
-}
-
-/// Where a ball is (m) and how it moves (m/s) after `time` (s) of rolling with `deceleration` (m/s^2).
-pub(crate) fn roll(ball: [f64; 2], velocity: [f64; 2], deceleration: f64, time: f64) -> ([f64; 2], [f64; 2]) {
-    let speed = velocity[0].hypot(velocity[1]);
-    if speed < 1e-6 || time <= 0.0 {
-        return (ball, velocity);
-    }
-    let t = time.min(speed / deceleration);
-    let way = (speed - 0.5 * deceleration * t) * t / speed;
-    let left = (speed - deceleration * t) / speed;
-    ([ball[0] + velocity[0] * way, ball[1] + velocity[1] * way], velocity.map(|v| v * left))
-}
-
 /// The refusals that need no kinematics.
-fn check_place(body: &Body, settings: &DynamicSettings, ball: [f64; 2]) -> Result<(), Refusal> {
+fn check_place(body: &Body, ball: [f64; 2]) -> Result<(), Refusal> {
     let distance = ball[0].hypot(ball[1]);
-    let reach = body.leg_length + settings.ball.radius;
+    let reach = body.leg_length + body.ball.radius;
     if distance > reach {
         return Err(Refusal::TooFar { distance, reach });
     }
@@ -472,8 +455,8 @@ fn check_place(body: &Body, settings: &DynamicSettings, ball: [f64; 2]) -> Resul
     let y = [right.outline_y[0] - body.half_width, left.outline_y[1] + body.half_width];
     let x = left.outline_x;
     let outside = |value: f64, [low, high]: [f64; 2]| (low - value).max(value - high).max(0.0);
-    let gap = outside(ball[0], x).hypot(outside(ball[1], y)) - settings.ball.radius;
-    let least = -0.25 * settings.ball.radius;
+    let gap = outside(ball[0], x).hypot(outside(ball[1], y)) - body.ball.radius;
+    let least = -0.25 * body.ball.radius;
     if gap < least {
         return Err(Refusal::BallUnderRobot { gap, least });
     }

@@ -17,8 +17,6 @@ pub struct DynamicSettings {
     /// Pairs of joints that one motor turns; they get the same angle and share the torque.
     #[serde(default)]
     pub coupled: Vec<[String; 2]>,
-    /// The ball that is played.
-    pub ball: BallModel,
     /// Geometry of the swing.
     pub swing: Swing,
     /// How long phases take.
@@ -35,22 +33,6 @@ pub struct DynamicSettings {
     pub accuracy: Accuracy,
     /// The closed loop.
     pub feedback: Feedback,
-}
-
-/// What the engine assumes of the ball and its impact.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct BallModel {
-    /// Radius, m.
-    pub radius: f64,
-    /// Mass, kg.
-    pub mass: f64,
-    /// Restitution of foot on ball, in (0, 1): v_ball = v_foot (1 + e) M / (M + m).
-    pub restitution: f64,
-    /// Deceleration of the rolling ball, m/s^2: turns a distance into a speed and forecasts a moving ball.
-    pub deceleration: f64,
-    /// Foot speed asked of the plan over the one that the impact needs; makes up for drives that lag. About 1.
-    pub speed_gain: f64,
 }
 
 /// Geometry of the swing.
@@ -72,6 +54,8 @@ pub struct Swing {
     /// How much the foot pitches up on its way, rad a metre: relieves the ankle of turning as fast as the shank. The
     /// foot is level at the contact and turns about the striking face's axis.
     pub pitch: f64,
+    /// Foot speed asked of the plan over the one that the impact needs; makes up for drives that lag. About 1.
+    pub speed_gain: f64,
     /// Width of the corridor around the x axis in which equation (1) chooses the foot, m.
     pub corridor: f64,
     /// Largest yaw of the foot, rad.
@@ -225,14 +209,10 @@ impl DynamicSettings {
             let expected = format!("a number in [{low}, {high}]");
             Err(KickError::Setting { field: field.to_owned(), found: value.to_string(), expected })
         };
-        let (b, s, t, l, f) = (&self.ball, &self.swing, &self.times, &self.limits, &self.feedback);
+        let (s, t, l, f) = (&self.swing, &self.times, &self.limits, &self.feedback);
         for (field, value, low, high) in [
             ("control_period", self.control_period, 0.001, 0.02),
-            ("ball.radius", b.radius, 0.01, 0.2),
-            ("ball.mass", b.mass, 0.005, 1.0),
-            ("ball.restitution", b.restitution, 0.01, 0.99),
-            ("ball.deceleration", b.deceleration, 0.01, 5.0),
-            ("ball.speed_gain", b.speed_gain, 0.3, 3.0),
+            ("swing.speed_gain", s.speed_gain, 0.3, 3.0),
             ("swing.windup", s.windup, 0.01, 0.6),
             ("swing.windup_least", s.windup_least, 0.005, s.windup),
             ("swing.follow", s.follow, 0.01, 0.6),

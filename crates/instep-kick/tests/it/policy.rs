@@ -51,8 +51,44 @@ fn odometry_follows_a_kick_through_its_impact_within_three_centimetres() {
         world.advance(&command, None).unwrap();
         suite.sense(&world);
     }
+    println!("{place} {speed}");
     assert!(place < 0.03, "the base was believed to be up to {place:.3} m away from where it was");
     assert!(speed < 0.5, "its velocity was wrong by up to {speed:.3} m/s");
+}
+
+#[test]
+fn standing_feet_take_a_wrong_start_out_of_the_odometry() {
+    let (robot, _) = prestoe();
+    let mut world = World::new(Arc::clone(&robot), &WorldSettings::default()).unwrap();
+    let mut suite = SensorSuite::new(&world, 1);
+    let mut sensors = Sensors::default();
+    let mut command = JointCommand::zeros(robot.joints.len());
+    command.positions.copy_from_slice(&robot.stand[7..]);
+    let mut odometry = Odometry::new(&robot);
+    let wrong = Vector3::new(0.3, -0.2, 0.1);
+    odometry.start(0.0, Vector3::from_column_slice(&robot.stand[..3]) + Vector3::z() * 0.05, wrong);
+    for _ in 0..150 {
+        suite.sense(&world);
+        suite.read_into(world.time(), &mut sensors);
+        odometry.update(&sensors);
+        world.advance(&command, None).unwrap();
+    }
+    let speed = odometry.velocity() - Vector3::from_column_slice(&world.v()[..3]);
+    assert!(speed.norm() < 0.02, "after 0.3 s the velocity is still wrong by {speed:?}");
+    let height = odometry.position().z - world.q()[2];
+    assert!(height.abs() < 0.005, "and the height by {height}");
+}
+
+#[test]
+fn behind_its_window_a_track_stands_still_in_the_last_pose() {
+    let (robot, reference) = prestoe();
+    let mut track = Track::new(&robot, reference, [0.9, 1.0]).unwrap();
+    let (mut end, mut later) = (TrackState::default(), TrackState::default());
+    track.sample_into(0.1 - 1e-9, &mut end);
+    track.sample_into(0.7, &mut later);
+    let apart = end.q.iter().zip(&later.q).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    assert!(apart < 1e-6, "{apart}");
+    assert!(end.v.iter().any(|v| v.abs() > 1.0) && later.v.iter().all(|&v| v == 0.0));
 }
 
 fn follower(robot: &Robot, reference: &Arc<Reference>) -> Follower {

@@ -53,7 +53,7 @@ impl Rig {
     pub(crate) fn new(name: &str, ball: [f64; 2]) -> Self {
         let engine = engine(name);
         let robot = robot(name);
-        let model = engine.settings().ball;
+        let model = *engine.ball();
         let mut settings =
             WorldSettings { ball: Ball { mass: model.mass, radius: model.radius }, ..WorldSettings::default() };
         settings.step.near_distance = 0.02;

@@ -27,7 +27,7 @@ pub(crate) fn robot() -> Arc<Robot> {
 /// A simulation of small cost: the ball's impacts are not measured here.
 pub(crate) fn simulation(robot: &Arc<Robot>, paced: bool) -> Simulation {
     let dynamic = DynamicKick::load(Arc::clone(robot)).unwrap();
-    let ball = dynamic.settings().ball;
+    let ball = *dynamic.ball();
     let mut world = WorldSettings { ball: Ball { mass: ball.mass, radius: ball.radius }, ..WorldSettings::default() };
     world.step.near_distance = 0.02;
     world.step.near = 0.0005;
