@@ -7,6 +7,7 @@ use std::path::Path;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 
 use crate::LearnError;
+use crate::adam::Adam;
 use crate::settings::LearnSettings;
 use crate::train::{State, Training};
 
@@ -61,11 +62,13 @@ pub fn save(training: &Training, path: &Path) -> Result<(), LearnError> {
     let f64s = |values: &[f64]| values.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>();
     let (ppo, rollout) = (&training.ppo, &training.rollout);
     let moments = &rollout.moments;
-    let scalars = [ppo.rate, ppo.adam.t as f64, ppo.warm_up as f64, moments.count];
+    let scalars = [ppo.rate, ppo.actor_adam.t as f64, ppo.warm_up as f64, moments.count, ppo.critic_adam.t as f64];
     let tensors = [
         ("weights", Dtype::F32, f32s(&ppo.weights.flat)),
-        ("adam.m", Dtype::F32, f32s(&ppo.adam.m)),
-        ("adam.v", Dtype::F32, f32s(&ppo.adam.v)),
+        ("actor.m", Dtype::F32, f32s(&ppo.actor_adam.m)),
+        ("actor.v", Dtype::F32, f32s(&ppo.actor_adam.v)),
+        ("critic.m", Dtype::F32, f32s(&ppo.critic_adam.m)),
+        ("critic.v", Dtype::F32, f32s(&ppo.critic_adam.v)),
         ("moments.sum", Dtype::F64, f64s(&moments.sum)),
         ("moments.square", Dtype::F64, f64s(&moments.square)),
         ("starts", Dtype::F64, f64s(&rollout.starts.failures)),
@@ -117,19 +120,22 @@ fn fill(training: &mut Training, bytes: &[u8]) -> Result<(), String> {
     };
     let parameters = training.ppo.weights.flat.len();
     let observations = training.rollout.moments.sum.len();
-    let (weights, m, v) = (f32s("weights", parameters)?, f32s("adam.m", parameters)?, f32s("adam.v", parameters)?);
+    let (actor, critic) = (training.ppo.weights.sigma_part().end, training.ppo.weights.critic_part().len());
+    let weights = f32s("weights", parameters)?;
+    let (actor_m, actor_v) = (f32s("actor.m", actor)?, f32s("actor.v", actor)?);
+    let (critic_m, critic_v) = (f32s("critic.m", critic)?, f32s("critic.v", critic)?);
     let (sum, square) = (f64s("moments.sum", observations)?, f64s("moments.square", observations)?);
     let starts = f64s("starts", training.rollout.starts.failures.len())?;
-    let scalars = f64s("scalars", 4)?;
-    let finite = weights.iter().chain(&m).chain(&v).all(|x| x.is_finite())
+    let scalars = f64s("scalars", 5)?;
+    let finite = [&weights, &actor_m, &actor_v, &critic_m, &critic_v].into_iter().flatten().all(|x| x.is_finite())
         && sum.iter().chain(&square).chain(&starts).chain(&scalars).all(|x| x.is_finite());
     if !finite {
         return Err("a number is not finite".into());
     }
     training.ppo.weights.flat = weights;
-    (training.ppo.adam.m, training.ppo.adam.v) = (m, v);
+    training.ppo.actor_adam = Adam { m: actor_m, v: actor_v, t: scalars[1] as u64 };
+    training.ppo.critic_adam = Adam { m: critic_m, v: critic_v, t: scalars[4] as u64 };
     training.ppo.rate = scalars[0];
-    training.ppo.adam.t = scalars[1] as u64;
     training.ppo.warm_up = scalars[2] as u64;
     let moments = &mut training.rollout.moments;
     (moments.sum, moments.square, moments.count) = (sum, square, scalars[3]);

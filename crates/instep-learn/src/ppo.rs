@@ -142,9 +142,11 @@ pub struct Ppo {
     settings: PpoSettings,
     /// What it learned.
     pub weights: Weights,
-    /// Its optimiser.
-    pub adam: Adam,
-    /// Step size.
+    /// Optimiser of the policy, with its deviations.
+    pub actor_adam: Adam,
+    /// Optimiser of the value. The two share nothing: the value learns as fast as it can, whatever the policy may.
+    pub critic_adam: Adam,
+    /// Step size of the policy.
     pub rate: f64,
     /// Updates still to come in which only the value learns.
     pub warm_up: u64,
@@ -154,8 +156,8 @@ impl Ppo {
     /// With the weights to start from.
     #[must_use]
     pub fn new(settings: PpoSettings, weights: Weights) -> Self {
-        let adam = Adam::new(weights.flat.len());
-        Self { rate: settings.learning_rate, warm_up: settings.warm_up, settings, weights, adam }
+        let (actor_adam, critic_adam) = (Adam::new(weights.sigma_part().end), Adam::new(weights.critic_part().len()));
+        Self { rate: settings.learning_rate, warm_up: settings.warm_up, settings, weights, actor_adam, critic_adam }
     }
 
     /// Gradient of the loss over `chosen` samples, and the sums of what an [`Update`] tells.
@@ -239,17 +241,23 @@ impl Ppo {
         (gradient, sums)
     }
 
-    /// Steps along `gradient`, shortened where it is too long; policy and value each on their own.
+    /// Steps along `gradient`, shortened where it is too long; policy and value each on their own, the policy only once
+    /// it is warm: a moment that had gathered zeros would make its first steps too long.
     fn step(&mut self, gradient: &mut [f32]) {
         let most = self.settings.gradient as f32;
-        for part in [0..self.weights.sigma_part().end, self.weights.critic_part()] {
-            let part = &mut gradient[part];
+        let split = self.weights.sigma_part().end;
+        let (actor, critic) = self.weights.flat.split_at_mut(split);
+        let (actor_gradient, critic_gradient) = gradient.split_at_mut(split);
+        for part in [&mut *actor_gradient, &mut *critic_gradient] {
             let length = part.iter().map(|g| g * g).sum::<f32>().sqrt();
             if length > most {
                 part.iter_mut().for_each(|g| *g *= most / length);
             }
         }
-        self.adam.step(&mut self.weights.flat, gradient, self.rate as f32);
+        self.critic_adam.step(critic, critic_gradient, self.settings.critic_rate as f32);
+        if self.warm_up == 0 {
+            self.actor_adam.step(actor, actor_gradient, self.rate as f32);
+        }
         let [least, greatest] = self.settings.sigma_range.map(|sigma| sigma.ln() as f32);
         let part = self.weights.sigma_part();
         self.weights.flat[part].iter_mut().for_each(|log| *log = log.clamp(least, greatest));
@@ -282,7 +290,7 @@ impl Learner for Ppo {
                 return Err((name.into(), f64::from(*bad)));
             }
         }
-        let before = (self.weights.flat.clone(), self.adam.clone(), self.rate);
+        let before = self.clone();
         let old_sigmas = self.weights.sigmas();
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut order: Vec<usize> = (0..samples.len()).collect();
@@ -293,11 +301,8 @@ impl Learner for Ppo {
             for chosen in order.chunks(self.settings.minibatch) {
                 let (mut gradient, told) = self.gradient(samples, chosen, &old_sigmas);
                 if let Some(bad) = gradient.iter().find(|g| !g.is_finite()) {
-                    (self.weights.flat, self.adam, self.rate) = before;
+                    *self = before;
                     return Err(("an entry of the gradient".into(), f64::from(*bad)));
-                }
-                if self.warm_up > 0 {
-                    gradient[..self.weights.sigma_part().end].fill(0.0);
                 }
                 self.adapt(told.kl / chosen.len() as f64);
                 self.step(&mut gradient);

@@ -184,10 +184,12 @@ pub struct PpoSettings {
     pub lambda: f64,
     /// Clip of the probability ratio.
     pub clip: f64,
-    /// Step size at the start.
+    /// Step size of the policy at the start.
     pub learning_rate: f64,
     /// Step sizes that the adaptation may choose.
     pub learning_rate_range: [f64; 2],
+    /// Step size of the value.
+    pub critic_rate: f64,
     /// KL divergence of a gradient step that the step size is adapted to.
     pub kl: f64,
     /// Weight of the entropy.
@@ -214,6 +216,7 @@ impl Default for PpoSettings {
             clip: 0.2,
             learning_rate: 3e-4,
             learning_rate_range: [1e-5, 3e-3],
+            critic_rate: 5e-4,
             kl: 0.01,
             entropy: 0.0,
             gradient: 1.0,
@@ -354,6 +357,7 @@ impl LearnSettings {
         check("ppo.learning_rate_range", least, least > 0.0 && least <= most, "two rising numbers above 0")?;
         let rate = ppo.learning_rate;
         check("ppo.learning_rate", rate, (least..=most).contains(&rate), "inside learning_rate_range")?;
+        check("ppo.critic_rate", ppo.critic_rate, ppo.critic_rate > 0.0, "a number above 0")?;
         check("ppo.kl", ppo.kl, ppo.kl > 0.0, "a number above 0")?;
         check("ppo.entropy", ppo.entropy, ppo.entropy >= 0.0, "a number of at least 0")?;
         check("ppo.gradient", ppo.gradient, ppo.gradient > 0.0, "a number above 0")?;

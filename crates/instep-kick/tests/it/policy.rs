@@ -51,7 +51,6 @@ fn odometry_follows_a_kick_through_its_impact_within_three_centimetres() {
         world.advance(&command, None).unwrap();
         suite.sense(&world);
     }
-    println!("{place} {speed}");
     assert!(place < 0.03, "the base was believed to be up to {place:.3} m away from where it was");
     assert!(speed < 0.5, "its velocity was wrong by up to {speed:.3} m/s");
 }

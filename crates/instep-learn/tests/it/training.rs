@@ -68,7 +68,8 @@ fn a_training_goes_on_from_its_checkpoint() {
     let mut second = training(settings);
     checkpoint::restore(&mut second, &file).unwrap();
     assert_eq!(second.ppo.weights.flat, first.ppo.weights.flat);
-    assert_eq!(second.ppo.adam, first.ppo.adam);
+    assert_eq!(second.ppo.actor_adam, first.ppo.actor_adam);
+    assert_eq!(second.ppo.critic_adam, first.ppo.critic_adam);
     assert_eq!(second.rollout.moments, first.rollout.moments);
     assert_eq!(second.policy().to_bytes().unwrap(), first.policy().to_bytes().unwrap());
     let progress = second.iterate().unwrap();
