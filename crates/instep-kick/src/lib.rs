@@ -5,6 +5,7 @@
 //! - [`engine`]: the trait that every engine implements.
 //! - [`dynamic`]: paper 2's engine: splines of foot and trunk in the support foot's frame, stabilised by the centre of
 //!   pressure.
+//! - [`whole_body`]: what such engines share: the robot's feet, curves, feed-forward torques, closed loop.
 //! - [`track`]: a window of a reference on one robot; [`playback`]: plays one open loop; [`feedforward`]: the torques that it needs.
 //! - [`policy`]: runs a network that was trained to follow a reference (paper 1), with its state estimate.
 //! - [`tree`] and [`ik`]: kinematics without MuJoCo, and inverse kinematics with weighted goals under joint limits.
@@ -23,6 +24,7 @@ pub mod policy;
 pub mod request;
 pub mod track;
 pub mod tree;
+pub mod whole_body;
 
 pub use ball::BallModel;
 pub use engine::{Face, KickEngine, KickPlan, KickStatus, Phase, Progress};

@@ -9,15 +9,10 @@
 //!
 //! It does not walk, does not recover from a fall, and knows no obstacle but the robot itself.
 
-mod balance;
-mod body;
 mod follow;
-pub mod foot;
 mod motion;
-mod path;
 mod plan;
 mod settings;
-mod torque;
 
 use std::sync::Arc;
 
@@ -32,14 +27,16 @@ use crate::engine::{KickEngine, KickPlan, KickStatus, Phase, Progress};
 use crate::ik::Ik;
 use crate::request::{KickRequest, Refusal};
 use crate::tree::TreePose;
-use balance::Balance;
-use body::Body;
+use crate::whole_body::balance::Balance;
+use crate::whole_body::body::Body;
+use crate::whole_body::torque::Dynamics;
 use follow::Follow;
 use motion::{Motion, Stroke};
 use plan::Planner;
-use torque::Dynamics;
 
-pub use settings::{Accuracy, DynamicSettings, Feedback, Limits, Pid, Stance, Swing, Times};
+pub use crate::whole_body::{Feedback, Limits, Pid, Stance};
+use crate::whole_body::{body, foot, torque};
+pub use settings::{Accuracy, DynamicSettings, Swing, Times};
 
 /// Steps of inverse kinematics in a tick.
 const TICK_STEPS: usize = 3;

@@ -5,12 +5,12 @@ use instep_motion::phase::Side;
 use instep_motion::spline::State;
 use nalgebra::{Rotation3, Vector3};
 
-use crate::dynamic::body::Body;
-use crate::dynamic::foot::windup_point;
-use crate::dynamic::path::Path;
 use crate::dynamic::settings::DynamicSettings;
 use crate::engine::{Face, Phase};
 use crate::ik::Goals;
+use crate::whole_body::body::Body;
+use crate::whole_body::foot::windup_point;
+use crate::whole_body::path::Path;
 
 /// The kicking part of a motion: everything that depends on the ball.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,7 +1,7 @@
 //! bitbots_main#304: for a ball at (0.198, -0.148) m and a direction of -0.70 rad, paper 2's rule (equation 1) chose the
 //! left foot, which cannot reach the ball behind the right one. Here both feet are forecast, and the right one kicks.
 
-use instep_kick::dynamic::foot::paper_choice;
+use instep_kick::whole_body::foot::paper_choice;
 use instep_kick::{KickEngine, KickRequest, Refusal, Strength};
 use instep_motion::phase::Side;
 

@@ -9,8 +9,8 @@ use nalgebra::{Rotation3, Vector3};
 
 use crate::KickError;
 use crate::ball::BallModel;
-use crate::dynamic::foot::Foot;
 use crate::tree::Tree;
+use crate::whole_body::foot::Foot;
 
 /// The robot standing, in the frame of one sole.
 #[derive(Debug, Clone, Copy)]

@@ -8,7 +8,7 @@
 
 use nalgebra::Vector3;
 
-use crate::dynamic::settings::{Feedback, Pid};
+use crate::whole_body::{Feedback, Pid};
 
 /// One PID controller with clamped output and conditional integration.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -61,6 +61,11 @@ impl Balance {
     pub(crate) fn new(settings: Feedback) -> Self {
         let (x, y) = (PidState::new(settings.x), PidState::new(settings.y));
         Self { settings, x, y, first: [0.0; 2], shift: [0.0; 2] }
+    }
+
+    /// The same without memory.
+    pub(crate) fn fresh(&self) -> Self {
+        Self::new(self.settings)
     }
 
     /// Shift of the centre of mass, m, from the measured and the planned centre of pressure in the support sole's frame.
