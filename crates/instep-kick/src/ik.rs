@@ -93,12 +93,27 @@ pub struct Residual {
     pub height: f64,
 }
 
+/// A pose held against goals, in the base frame.
+#[derive(Debug, Clone, Copy)]
+struct Compared {
+    residual: Residual,
+    /// Centres of the support sole and of the swing sole, m.
+    soles: [Vector3<f64>; 2],
+    com: Vector3<f64>,
+    /// `support_from_base`.
+    turn: Matrix3<f64>,
+    /// `swing_from_support`.
+    foot: Matrix3<f64>,
+}
+
 /// The solver for one robot; scratch space of one thread.
 #[derive(Debug, Clone)]
 pub struct Ik {
     /// Joints of each unknown: one, or two that one motor turns.
     unknowns: Vec<[Option<usize>; 2]>,
     ranges: Vec<[f64; 2]>,
+    /// Links that the unknowns move.
+    links: Vec<usize>,
     soles: [LinkPoint; 2],
     weights: Weights,
     jacobian: [[f64; UNKNOWNS]; ROWS],
@@ -166,9 +181,11 @@ impl Ik {
                 range
             })
             .collect();
+        let moving: Vec<usize> = unknowns.iter().flatten().flatten().copied().collect();
         Ok(Self {
             unknowns,
             ranges,
+            links: Tree::new(robot).links_moved_by(&moving),
             soles: [robot.legs[0].sole, robot.legs[1].sole],
             weights: Weights::default(),
             jacobian: [[0.0; UNKNOWNS]; ROWS],
@@ -197,33 +214,38 @@ impl Ik {
         steps: usize,
     ) -> Residual {
         tree.update(angles, pose);
-        let mut residual = self.linearise(tree, pose, swing, goals);
+        let mut at = self.compare(tree, pose, swing, goals);
         let mut cost = self.cost();
         let mut damping = self.weights.damping;
+        let mut fresh = false;
         for _ in 0..steps {
+            if !fresh {
+                self.linearise(tree, pose, swing, &at);
+                fresh = true;
+            }
             self.least_squares(angles, damping);
             let step = self.step;
             let largest = step.iter().fold(0.0_f64, |most, s| most.max(s.abs()));
             self.apply(&step, 1.0, angles);
-            tree.update(angles, pose);
-            let before = (self.jacobian, self.error);
-            let next = self.linearise(tree, pose, swing, goals);
+            tree.update_links(&self.links, angles, pose);
+            let before = self.error;
+            let next = self.compare(tree, pose, swing, goals);
             let next_cost = self.cost();
             // Levenberg and Marquardt: a step that makes things worse is taken back and damped.
             if next_cost > cost * 1.000_001 && largest > 1e-3 {
                 self.apply(&step, -1.0, angles);
-                tree.update(angles, pose);
-                (self.jacobian, self.error) = before;
+                tree.update_links(&self.links, angles, pose);
+                self.error = before;
                 damping = (damping * 10.0).max(1.0);
                 continue;
             }
             damping = (damping * 0.2).max(self.weights.damping);
-            (residual, cost) = (next, next_cost);
+            (at, cost, fresh) = (next, next_cost, false);
             if largest < 1e-4 {
                 break;
             }
         }
-        residual
+        at.residual
     }
 
     /// Adds `share` of a step to the angles.
@@ -240,8 +262,8 @@ impl Ik {
         self.error.iter().map(|e| e * e).sum()
     }
 
-    /// Jacobian and error in the present pose.
-    fn linearise(&mut self, tree: &Tree, pose: &TreePose, swing: Side, goals: &Goals) -> Residual {
+    /// Where things are in the present pose; the error goes into `self.error`.
+    fn compare(&mut self, tree: &Tree, pose: &TreePose, swing: Side, goals: &Goals) -> Compared {
         let (support, flying) = (&self.soles[swing.other() as usize], &self.soles[swing as usize]);
         let (s, f) = (pose.point(support), pose.point(flying));
         let turn = pose.rotation[support.link].transpose();
@@ -277,6 +299,23 @@ impl Ik {
         self.error[10] = w.balance * balance_error[0];
         self.error[11] = w.balance * balance_error[1];
 
+        let residual = Residual {
+            position: position_error.norm(),
+            orientation: orientation_error.yz().norm(),
+            roll: orientation_error.x.abs(),
+            balance: balance_error[0].hypot(balance_error[1]),
+            tilt: base_error.xy().norm(),
+            height: height_error.abs(),
+        };
+        Compared { residual, soles: [s, f], com: com_base, turn, foot }
+    }
+
+    /// Jacobian in the pose that was compared.
+    fn linearise(&mut self, tree: &Tree, pose: &TreePose, swing: Side, at: &Compared) {
+        let (support, flying) = (&self.soles[swing.other() as usize], &self.soles[swing as usize]);
+        let Compared { soles: [s, f], com: com_base, turn, foot, .. } = *at;
+        let w = self.weights;
+        let orientation = [w.roll, w.orientation, w.orientation];
         for (n, joints) in self.unknowns.iter().enumerate() {
             let mut column = [0.0; ROWS];
             for &joint in joints.iter().flatten() {
@@ -305,14 +344,6 @@ impl Ik {
             for (row, value) in self.jacobian.iter_mut().zip(column) {
                 row[n] = value;
             }
-        }
-        Residual {
-            position: position_error.norm(),
-            orientation: orientation_error.yz().norm(),
-            roll: orientation_error.x.abs(),
-            balance: balance_error[0].hypot(balance_error[1]),
-            tilt: base_error.xy().norm(),
-            height: height_error.abs(),
         }
     }
 

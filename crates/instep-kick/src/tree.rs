@@ -8,7 +8,7 @@
 
 use instep_robot::{LinkPoint, Robot, closest_points};
 use mujoco_rs::prelude::MjtGeomBase;
-use nalgebra::{Matrix3, Quaternion, Unit, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
 /// One link of the tree.
 #[derive(Debug, Clone)]
@@ -16,10 +16,21 @@ struct Link {
     parent: usize,
     position: Vector3<f64>,
     rotation: Matrix3<f64>,
-    /// Joints of this link in order: index, axis and anchor in the link's frame.
-    joints: Vec<(usize, Unit<Vector3<f64>>, Vector3<f64>)>,
+    /// Joints of this link in order.
+    joints: Vec<Joint>,
     mass: f64,
     centre: Vector3<f64>,
+}
+
+/// A joint in its link's frame.
+#[derive(Debug, Clone)]
+struct Joint {
+    index: usize,
+    axis: Vector3<f64>,
+    anchor: Vector3<f64>,
+    /// The matrix of the cross product with the axis, and its square.
+    cross: Matrix3<f64>,
+    cross_square: Matrix3<f64>,
 }
 
 /// A capsule fixed to a link.
@@ -74,8 +85,9 @@ impl Tree {
         // Model joint 0 is the free joint.
         for (j, link) in link_of.iter_mut().enumerate() {
             *link = index(model.jnt_bodyid()[j + 1]);
-            let axis = Unit::new_normalize(Vector3::from(model.jnt_axis()[j + 1]));
-            links[*link].joints.push((j, axis, model.jnt_pos()[j + 1].into()));
+            let axis = Vector3::from(model.jnt_axis()[j + 1]).normalize();
+            let (cross, anchor) = (axis.cross_matrix(), model.jnt_pos()[j + 1].into());
+            links[*link].joints.push(Joint { index: j, axis, anchor, cross, cross_square: cross * cross });
         }
         let mut moves = vec![vec![false; count]; joints];
         for (j, row) in moves.iter_mut().enumerate() {
@@ -127,31 +139,60 @@ impl Tree {
             rotation: vec![Matrix3::identity(); links],
             axis: vec![zero; joints],
             anchor: vec![zero; joints],
+            centre: vec![zero; links],
             moment: vec![zero; links],
             mass: vec![0.0; links],
         }
     }
 
+    /// Links that at least one of `joints` moves, parents first: what [`Tree::update_links`] has to look at when nothing
+    /// else has changed.
+    #[must_use]
+    pub fn links_moved_by(&self, joints: &[usize]) -> Vec<usize> {
+        (1..self.links.len()).filter(|&link| joints.iter().any(|&joint| self.moves[joint][link])).collect()
+    }
+
     /// Computes all of `pose` for the joint angles (rad).
     pub fn update(&self, angles: &[f64], pose: &mut TreePose) {
-        for (b, link) in self.links.iter().enumerate().skip(1) {
+        self.place(1..self.links.len(), angles, pose);
+        self.weigh(pose);
+    }
+
+    /// The same for a pose in which only joints have changed whose links are `links`.
+    pub fn update_links(&self, links: &[usize], angles: &[f64], pose: &mut TreePose) {
+        self.place(links.iter().copied(), angles, pose);
+        self.weigh(pose);
+    }
+
+    fn place(&self, links: impl Iterator<Item = usize>, angles: &[f64], pose: &mut TreePose) {
+        for b in links {
+            let link = &self.links[b];
             let (mut position, mut rotation) = if b == self.base {
                 (Vector3::zeros(), Matrix3::identity())
             } else {
                 let (p, r) = (pose.position[link.parent], pose.rotation[link.parent]);
                 (p + r * link.position, r * link.rotation)
             };
-            for (j, axis, anchor) in &link.joints {
-                let pivot = position + rotation * anchor;
-                pose.anchor[*j] = pivot;
-                pose.axis[*j] = rotation * axis.into_inner();
-                rotation *= nalgebra::Rotation3::from_axis_angle(axis, angles[*j]).into_inner();
-                position = pivot - rotation * anchor;
+            for joint in &link.joints {
+                let pivot = position + rotation * joint.anchor;
+                pose.anchor[joint.index] = pivot;
+                pose.axis[joint.index] = rotation * joint.axis;
+                // Rodrigues' formula.
+                let (sine, cosine) = angles[joint.index].sin_cos();
+                rotation *= Matrix3::identity() + joint.cross * sine + joint.cross_square * (1.0 - cosine);
+                position = pivot - rotation * joint.anchor;
             }
             pose.position[b] = position;
             pose.rotation[b] = rotation;
+            pose.centre[b] = position + rotation * link.centre;
+        }
+    }
+
+    /// Masses and moments of the subtrees.
+    fn weigh(&self, pose: &mut TreePose) {
+        for (b, link) in self.links.iter().enumerate().skip(1) {
             pose.mass[b] = link.mass;
-            pose.moment[b] = (position + rotation * link.centre) * link.mass;
+            pose.moment[b] = pose.centre[b] * link.mass;
         }
         for b in (1..self.links.len()).rev() {
             let parent = self.links[b].parent;
@@ -211,6 +252,8 @@ pub struct TreePose {
     pub axis: Vec<Vector3<f64>>,
     /// Anchor of each joint, m.
     pub anchor: Vec<Vector3<f64>>,
+    /// Centre of mass of each link, m.
+    centre: Vec<Vector3<f64>>,
     /// Mass times centre of each link's subtree, kg m.
     moment: Vec<Vector3<f64>>,
     /// Mass of each link's subtree, kg.

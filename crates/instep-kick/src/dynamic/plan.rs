@@ -12,7 +12,7 @@ use instep_motion::phase::Side;
 use nalgebra::{Vector2, Vector3};
 
 use crate::dynamic::body::Body;
-use crate::dynamic::foot::{contact_point, paper_choice, paper_face};
+use crate::dynamic::foot::{FacePoint, contact_point, paper_choice, paper_face};
 use crate::dynamic::motion::{Motion, Stroke, goals, trunk_support};
 use crate::dynamic::settings::DynamicSettings;
 use crate::dynamic::torque::Dynamics;
@@ -37,6 +37,38 @@ const COARSE: f64 = 0.03;
 
 /// Least and greatest angle from the foot's x axis at which a corner strikes, rad.
 const CORNER: [f64; 2] = [0.0, 1.3];
+
+/// Every way to strike: front and sides with the foot turned as the face needs; the corners with the foot turned all the
+/// way, half or not.
+const WAYS: [(Side, Face, f64); 12] = {
+    let [l, r] = [Side::Left, Side::Right];
+    [
+        (l, Face::Front, 1.0),
+        (l, Face::Inner, 1.0),
+        (l, Face::Outer, 1.0),
+        (l, Face::Corner, 1.0),
+        (l, Face::Corner, 0.5),
+        (l, Face::Corner, 0.0),
+        (r, Face::Front, 1.0),
+        (r, Face::Inner, 1.0),
+        (r, Face::Outer, 1.0),
+        (r, Face::Corner, 1.0),
+        (r, Face::Corner, 0.5),
+        (r, Face::Corner, 0.0),
+    ]
+};
+
+/// How a foot and face would strike.
+#[derive(Debug, Clone, Copy)]
+struct Aim {
+    /// Direction of the strike, rad.
+    direction: f64,
+    point: FacePoint,
+    /// The foot's, rad.
+    yaw: f64,
+    /// The part of the cost that is known without kinematics.
+    cost: f64,
+}
 
 /// A foot and face that reach the three places.
 #[derive(Debug, Clone, Copy)]
@@ -139,38 +171,31 @@ impl Planner {
     ) -> Result<Planned, Refusal> {
         let (ball, velocity) = body.ball.roll(request.ball, request.ball_velocity, time);
         check_place(body, ball)?;
-        let mut candidates: [Option<Candidate>; 12] = [None; 12];
         let mut refusal: Option<Refusal> = None;
-        let mut count = 0;
-        for swing in [Side::Left, Side::Right] {
-            if request.foot.is_some_and(|foot| foot != swing) {
-                continue;
+        // What each would cost at least, cheapest first: once two are cheaper than all that are left, none of those can
+        // be one of the two best.
+        let mut waiting = WAYS.map(|(swing, face, turn)| {
+            let asked = request.foot.is_none_or(|foot| foot == swing);
+            let aim = if asked { self.aim(body, settings, request, velocity, swing, (face, turn)) } else { None };
+            aim.map(|aim| (swing, face, aim))
+        });
+        let least = |way: &Option<(Side, Face, Aim)>| way.as_ref().map_or(f64::INFINITY, |(_, _, aim)| aim.cost);
+        waiting.sort_by(|a, b| least(a).total_cmp(&least(b)));
+        let cost = |c: &Option<Candidate>| c.map_or(f64::INFINITY, |c| c.cost);
+        let mut candidates: [Option<Candidate>; 2] = [None; 2];
+        for (swing, face, aim) in waiting.into_iter().flatten() {
+            if cost(&candidates[1]) <= aim.cost {
+                break;
             }
-            // Front and sides with the foot turned as the face needs; the corners with the foot turned half or not.
-            for (face, turn) in [
-                (Face::Front, 1.0),
-                (Face::Inner, 1.0),
-                (Face::Outer, 1.0),
-                (Face::Corner, 1.0),
-                (Face::Corner, 0.5),
-                (Face::Corner, 0.0),
-            ] {
-                match self.screen(body, settings, request, (ball, velocity), swing, (face, turn)) {
-                    Some(Ok(candidate)) => candidates[count] = Some(candidate),
-                    Some(Err(cause)) => {
-                        refusal = Some(graver(refusal, cause));
-                    }
-                    None => {}
-                }
-                count += 1;
+            match self.screen(body, settings, request, (ball, velocity), swing, face, &aim) {
+                Ok(found) if found.cost < cost(&candidates[0]) => candidates = [Some(found), candidates[0]],
+                Ok(found) if found.cost < cost(&candidates[1]) => candidates[1] = Some(found),
+                Ok(_) => {}
+                Err(cause) => refusal = Some(graver(refusal, cause)),
             }
         }
-        candidates.sort_by(|a, b| {
-            let cost = |c: &Option<Candidate>| c.map_or(f64::INFINITY, |c| c.cost);
-            cost(a).total_cmp(&cost(b))
-        });
         // The two best are enough: what neither can do, the sixth will not.
-        for candidate in candidates.iter().flatten().take(2) {
+        for candidate in candidates.iter().flatten() {
             let motion = Motion::kick(body, settings, &candidate.stroke);
             let forecast = if whole { self.forecast(body, settings, &motion, &candidate.stroke) } else { Ok(()) };
             match forecast {
@@ -193,26 +218,21 @@ impl Planner {
         Err(refusal.unwrap_or(Refusal::Unreachable { foot: Side::Right, place: Place::Contact, gap: f64::INFINITY }))
     }
 
-    /// Looks at one foot and face: `None` when the foot would have to turn too far.
-    fn screen(
-        &mut self,
+    /// Which way a foot and face must strike and how the foot must turn for it; `None` when it would have to turn too far.
+    fn aim(
+        &self,
         body: &Body,
         settings: &DynamicSettings,
         request: &KickRequest,
-        (ball, velocity): ([f64; 2], [f64; 2]),
+        velocity: [f64; 2],
         swing: Side,
         (face, turn): (Face, f64),
-    ) -> Option<Result<Candidate, Refusal>> {
+    ) -> Option<Aim> {
         let s = &settings.swing;
         // A moving ball keeps its speed: the impulse must point from it to the wanted velocity.
         let ball_velocity = Vector2::from(velocity);
-        let wanted_speed = |mass: f64| match request.strength {
-            Strength::BallSpeed(v) => v,
-            Strength::FootSpeed(v) => v * body.ball.gain(mass),
-            Strength::Distance(d) => (2.0 * body.ball.deceleration * d).sqrt(),
-        };
-        let aim = Vector2::new(request.direction.cos(), request.direction.sin()) * wanted_speed(1.0) - ball_velocity;
-        let direction = if ball_velocity.norm() > 0.02 { aim.y.atan2(aim.x) } else { request.direction };
+        let wanted = unit(request.direction) * wanted_speed(body, request, 1.0) - ball_velocity;
+        let direction = if ball_velocity.norm() > 0.02 { wanted.y.atan2(wanted.x) } else { request.direction };
         let (point, yaw) = if face == Face::Corner {
             let yaw = turn * direction;
             let turned = wrap(direction - yaw);
@@ -227,6 +247,32 @@ impl Planner {
         if yaw.abs() > s.yaw || (face == Face::Corner && !corner_range) {
             return None;
         }
+        let mut cost = 0.4 * yaw.abs() / FRAC_PI_4
+            + match face {
+                Face::Front => 0.0,
+                Face::Inner | Face::Outer => 0.3,
+                Face::Corner => 0.5,
+            };
+        cost -= if paper_choice(request.ball, request.direction, s.corridor) == swing { 0.15 } else { 0.0 };
+        cost -= if paper_face(swing, request.direction) == face { 0.15 } else { 0.0 };
+        Some(Aim { direction, point, yaw, cost })
+    }
+
+    /// Looks whether a foot and face reach the three places.
+    #[allow(clippy::too_many_arguments, reason = "one request, one ball, one foot")]
+    fn screen(
+        &mut self,
+        body: &Body,
+        settings: &DynamicSettings,
+        request: &KickRequest,
+        (ball, velocity): ([f64; 2], [f64; 2]),
+        swing: Side,
+        face: Face,
+        aim: &Aim,
+    ) -> Result<Candidate, Refusal> {
+        let s = &settings.swing;
+        let ball_velocity = Vector2::from(velocity);
+        let Aim { direction, point, yaw, .. } = *aim;
         let height = (body.ball.radius + s.height - point.axis.z).max(s.sole_least);
         let center = Vector2::from(body.support_from_footprint(swing, ball));
         let contact = contact_point(center, direction, &point, yaw, height, body.ball.radius);
@@ -245,9 +291,7 @@ impl Planner {
 
         // Contact first: where it is out of reach, nothing else matters.
         self.angles.copy_from_slice(&self.lifted[swing as usize]);
-        if let Err(cause) = self.reach(body, settings, &stroke, stroke.pose(0.0), Place::Contact, FAR) {
-            return Some(Err(cause));
-        }
+        self.reach(body, settings, &stroke, stroke.pose(0.0), Place::Contact, FAR)?;
         self.saved.copy_from_slice(&self.angles);
         let limit = self.limit_margin(body);
 
@@ -256,9 +300,8 @@ impl Planner {
         let toward = Vector3::new(direction.cos(), direction.sin(), 0.0);
         let strike = contact + nalgebra::Rotation3::from_axis_angle(&Vector3::z_axis(), yaw) * point.axis;
         let mass = self.dynamics.effective_mass(body.robot.leg(swing).foot, &strike, &toward);
-        let ball_speed = wanted_speed(mass);
-        let change =
-            (Vector2::new(request.direction.cos(), request.direction.sin()) * ball_speed - ball_velocity).norm();
+        let ball_speed = wanted_speed(body, request, mass);
+        let change = (unit(request.direction) * ball_speed - ball_velocity).norm();
         let along = ball_velocity.dot(&toward.xy());
         stroke.speed = (change / body.ball.gain(mass) * s.speed_gain + along).max(0.1);
         let ahead = 0.01;
@@ -271,8 +314,7 @@ impl Planner {
             .map(|(j, joint)| ((self.angles[j] - self.saved[j]) / ahead * stroke.speed / joint.speed, j))
             .fold((0.0_f64, 0), |most, (share, j)| if share.abs() > most.0 { (share.abs(), j) } else { most });
         if beyond.is_ok() && share.0 > settings.limits.speed {
-            let cause = Refusal::TooFast { foot: swing, asked: stroke.speed, share: share.0, joint: share.1 };
-            return Some(Err(cause));
+            return Err(Refusal::TooFast { foot: swing, asked: stroke.speed, share: share.0, joint: share.1 });
         }
 
         // The longest wind-up and follow-through there is room for.
@@ -283,8 +325,8 @@ impl Planner {
             let place = stroke.windup_pose();
             self.reach(body, settings, &stroke, place, Place::WindUp, MIDDLE).map_err(|e| failure = Some(e)).ok()
         });
-        if fits.is_none() {
-            return failure.map(Err);
+        if let (None, Some(cause)) = (fits, failure) {
+            return Err(cause);
         }
         let fits = [1.0, 0.5, 0.0].into_iter().find_map(|share| {
             stroke.follow = s.follow * (0.3 + 0.7 * share);
@@ -292,22 +334,14 @@ impl Planner {
             let place = stroke.follow_pose();
             self.reach(body, settings, &stroke, place, Place::FollowThrough, MIDDLE).map_err(|e| failure = Some(e)).ok()
         });
-        if fits.is_none() {
-            return failure.map(Err);
+        if let (None, Some(cause)) = (fits, failure) {
+            return Err(cause);
         }
-        let paper = paper_choice(request.ball, request.direction, s.corridor);
-        let mut cost = share.0 / settings.limits.speed;
+        // All that is added to the aim's cost is at least zero: the search leaves off by it.
+        let mut cost = aim.cost + share.0 / settings.limits.speed;
         cost += 0.8 * (1.0 - stroke.windup / s.windup) + 0.3 * (1.0 - stroke.follow / s.follow);
-        cost += 0.4 * yaw.abs() / FRAC_PI_4
-            + match face {
-                Face::Front => 0.0,
-                Face::Inner | Face::Outer => 0.3,
-                Face::Corner => 0.5,
-            };
         cost += 0.3 * (1.0 - limit / 0.1).clamp(0.0, 1.0);
-        cost -= if paper == swing { 0.15 } else { 0.0 };
-        cost -= if paper_face(swing, request.direction) == face { 0.15 } else { 0.0 };
-        Some(Ok(Candidate { stroke, cost, ball_speed }))
+        Ok(Candidate { stroke, cost, ball_speed })
     }
 
     /// Moves the foot to `place` by inverse kinematics and judges the pose.
@@ -440,6 +474,19 @@ impl Planner {
             }
         }
         Ok(())
+    }
+}
+
+fn unit(angle: f64) -> Vector2<f64> {
+    Vector2::new(angle.cos(), angle.sin())
+}
+
+/// Speed that the ball is to leave with (m/s) when the foot's effective mass is `mass` (kg).
+fn wanted_speed(body: &Body, request: &KickRequest, mass: f64) -> f64 {
+    match request.strength {
+        Strength::BallSpeed(v) => v,
+        Strength::FootSpeed(v) => v * body.ball.gain(mass),
+        Strength::Distance(d) => (2.0 * body.ball.deceleration * d).sqrt(),
     }
 }
 
