@@ -141,9 +141,7 @@ impl Subject {
         let mut world =
             WorldSettings { ball: Ball { mass: self.ball.mass, radius: self.ball.radius }, ..WorldSettings::default() };
         world.pitch.rolling_deceleration = self.ball.deceleration;
-        // Feet of these robots pass the ball at under 3 m/s: more than twice that times the far step. A light ball needs
-        // a finer near step than the default for the audit's 2 %.
-        world.step.near_distance = 0.02;
+        // A light ball needs a finer near step than the default for the audit's 2 %.
         world.step.near = 0.0001;
         world
     }

@@ -105,8 +105,8 @@ impl Default for ImpactLaw {
     }
 }
 
-/// Time steps, s. The near step holds while the gap between ball and any striking geom is under `near_distance` (m),
-/// so that a contact never starts inside a far step: that is what makes a soft contact gain energy.
+/// Time steps, s. The near step holds while ball and foot could meet within a few far steps, so that a contact never
+/// starts inside a far step: that is what makes a soft contact gain energy.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Step {
@@ -114,13 +114,13 @@ pub struct Step {
     pub far: f64,
     /// Step near the ball, s; the far step is a whole multiple of it.
     pub near: f64,
-    /// Gap that counts as near, m. More than twice the fastest approach times the far step.
+    /// Gap between the ball and a striking geom that counts as near even where they do not move, m.
     pub near_distance: f64,
 }
 
 impl Default for Step {
     fn default() -> Self {
-        Self { far: 0.002, near: 0.00025, near_distance: 0.08 }
+        Self { far: 0.002, near: 0.00025, near_distance: 0.005 }
     }
 }
 

@@ -23,6 +23,9 @@ use crate::settings::{ModelError, WorldSettings};
 
 const FLOOR: &str = "instep_floor";
 const BALL: &str = "instep_ball";
+/// Far steps before a possible contact from which the near step holds: one that is taken, one by which what MuJoCo last
+/// computed is late, and one for what speeds up meanwhile.
+const NEAR_STEPS: f64 = 3.0;
 
 /// Where the ball is and how it moves, world frame, SI units.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -268,13 +271,18 @@ impl World {
         Ok(())
     }
 
-    /// Whether the gap between the ball and a striking geom is under the near distance.
+    /// Whether the gap between the ball and a striking geom is under the near distance and what they approach each other
+    /// in [`NEAR_STEPS`] far steps.
     fn is_near(&mut self) -> bool {
-        let reach = self.settings.step.near_distance;
+        let step = self.settings.step;
         let ball = Vector3::from(self.data.geom_xpos()[self.ball_geom]);
+        let ball_velocity = Vector3::from(self.ball().velocity);
         let radius = self.settings.ball.radius;
         (0..self.strike.len()).any(|i| {
             let (geom, bound) = self.strike[i];
+            let [wx, wy, wz, vx, vy, vz] = self.data.object_velocity(MjtObjBase::mjOBJ_GEOM, geom, false);
+            let speed = (Vector3::new(vx, vy, vz) - ball_velocity).norm() + Vector3::new(wx, wy, wz).norm() * bound;
+            let reach = step.near_distance + NEAR_STEPS * step.far * speed;
             let centre = Vector3::from(self.data.geom_xpos()[geom]);
             (ball - centre).norm() < reach + radius + bound
                 && self.data.geom_distance(geom, self.ball_geom, 2.0 * reach, None) < reach

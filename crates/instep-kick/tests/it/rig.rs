@@ -54,9 +54,8 @@ impl Rig {
         let engine = engine(name);
         let robot = robot(name);
         let model = *engine.ball();
-        let mut settings =
+        let settings =
             WorldSettings { ball: Ball { mass: model.mass, radius: model.radius }, ..WorldSettings::default() };
-        settings.step.near_distance = 0.02;
         let mut world = World::new(Arc::clone(&robot), &settings).unwrap();
         let foot = engine.footprint_from_base();
         let at = [ball[0] - foot[0], ball[1] - foot[1], model.radius];

@@ -62,7 +62,7 @@ fn a_ball_thrown_at_a_foot_bounces_off_it() {
 fn an_impact_in_coarse_steps_is_invalid() {
     let mut world = WorldSettings::default();
     world.impact.contact_time = 0.003;
-    world.step = Step { far: 0.002, near: 0.002, near_distance: 0.08 };
+    world.step = Step { far: 0.002, near: 0.002, ..Step::default() };
     let invalid = (0..6).filter(|i| !trial(3.0 + f64::from(*i), world).audit.faults.is_empty()).count();
     assert!(invalid >= 4, "{invalid} of 6 were found out");
 }

@@ -46,8 +46,10 @@ pub(crate) fn block_impact(settings: &WorldSettings, mass: f64, speed: f64, phas
     let mut most: f64 = 0.0;
     data.forward();
     while data.time() < 0.4 / speed + 0.05 {
-        let gap = data.geom_distance(0, 1, 2.0 * step.near_distance, None);
-        let (dt, steps) = if gap < step.near_distance { (step.near, step.near_per_far()) } else { (step.far, 1) };
+        // As the world does it.
+        let reach = step.near_distance + 3.0 * step.far * speed;
+        let gap = data.geom_distance(0, 1, 2.0 * reach, None);
+        let (dt, steps) = if gap < reach { (step.near, step.near_per_far()) } else { (step.far, 1) };
         data.model_opt_mut().timestep = dt;
         for _ in 0..steps {
             data.step();
