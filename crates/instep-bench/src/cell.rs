@@ -5,7 +5,7 @@
 
 use std::sync::Arc;
 
-use instep_kick::{KickEngine, Refusal};
+use instep_kick::{KickEngine, KickPlan, Refusal};
 use instep_robot::control::{Controller, JointCommand, Sensors};
 use instep_sim::sensors::SensorSuite;
 use instep_sim::trial::{Disturbance, Trial, TrialSettings, run_disturbed};
@@ -130,10 +130,21 @@ pub fn world(subject: &Subject, scenario: &Scenario, case: &Case) -> Result<Worl
     Ok(World::new(Arc::clone(&subject.robot), &settings)?)
 }
 
-/// The outcome of a case, the time of its plan (s), and the trial of an accepted request.
-pub type Tried = (Result<Kicked, Refusal>, f64, Option<Trial>);
+/// What an accepted request led to.
+#[derive(Debug)]
+pub struct Ran {
+    /// What the engine planned.
+    pub plan: KickPlan,
+    /// How it was tried.
+    pub settings: TrialSettings,
+    /// What happened.
+    pub trial: Trial,
+}
 
-/// Plans and tries one case. Gives the outcome, the time of the plan (s) and the trial of an accepted request.
+/// The outcome of a case, the time of its plan (s), and what an accepted request led to.
+pub type Tried = (Result<Kicked, Refusal>, f64, Option<Ran>);
+
+/// Plans and tries one case. Gives the outcome, the time of the plan (s) and what an accepted request led to.
 ///
 /// # Errors
 /// When the simulation diverges.
@@ -188,7 +199,7 @@ pub fn run_case(
     let mut timed = Timed { engine, times: ticks };
     let trial = run_disturbed(world, &settings, &disturbances, &mut timed)?;
     let kicked = judge(subject, case, &trial);
-    Ok((Ok(kicked), plan_time, Some(trial)))
+    Ok((Ok(kicked), plan_time, Some(Ran { plan, settings, trial })))
 }
 
 fn judge(subject: &Subject, case: &Case, trial: &Trial) -> Kicked {

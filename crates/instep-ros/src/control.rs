@@ -20,6 +20,7 @@ use serde::Serialize;
 
 use crate::body::{Body, Freshness, Whereabouts, copy, fallen};
 use crate::histogram::{Histogram, Quantiles};
+use crate::priority::Priority;
 
 /// Commands go out at least this often, s.
 const COMMANDS: f64 = 0.002;
@@ -141,7 +142,7 @@ pub(crate) fn run(
     links: &Links,
     paced: bool,
 ) -> LoopReport {
-    let realtime = paced && crate::priority::raise();
+    let realtime = paced && crate::priority::raise(Priority::Control);
     let rounds = rounds_per_tick(engine.control_period());
     let dt = engine.control_period() / f64::from(rounds);
     let period = Duration::from_secs_f64(dt);

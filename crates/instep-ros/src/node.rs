@@ -19,6 +19,7 @@ use crate::fence;
 use crate::form::Form;
 use crate::histogram::Quantiles;
 use crate::log::{Log, Print};
+use crate::priority::{self, Priority};
 use crate::simulated::SimBody;
 use crate::wire::{State, Wire};
 
@@ -159,8 +160,14 @@ impl Node {
             }
         };
         let paced = settings.simulation.as_ref().is_none_or(|sim| sim.paced);
+        // The DDS library's own threads inherit what starts them.
+        let raised = paced && priority::raise(Priority::Network);
         let ends =
-            Endpoints::<F>::new(settings.domain, settings.network, settings.mapping, settings.simulation.is_some())?;
+            Endpoints::<F>::new(settings.domain, settings.network, settings.mapping, settings.simulation.is_some());
+        if raised {
+            priority::lower();
+        }
+        let ends = ends?;
         let unfenced = match settings.network {
             Network::Loopback => fence::raise(settings.domain).err().map(|e| e.to_string()),
             Network::Lan => None,
@@ -203,7 +210,12 @@ impl Node {
         };
         let thread = |name: &str| std::thread::Builder::new().name(name.into());
         let control = thread("instep-control").spawn(move || control::run(controller, body, joints, &links, paced))?;
-        let wire = thread("instep-wire").spawn(move || wire.run(poll))?;
+        let wire = thread("instep-wire").spawn(move || {
+            if paced {
+                priority::raise(Priority::Network);
+            }
+            wire.run(poll)
+        })?;
         Ok(Self { stop, control: Some(control), wire: Some(wire), unfenced })
     }
 

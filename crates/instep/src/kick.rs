@@ -10,8 +10,9 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use clap::Args;
-use instep_kick::Playback;
 use instep_kick::policy::PolicyKick;
+use instep_kick::{KickPlan, KickRequest, Playback};
+use instep_motion::phase::Side;
 use instep_motion::reference::{Reference, ReferenceKind};
 use instep_robot::Robot;
 use instep_robot::control::Controller;
@@ -56,7 +57,7 @@ pub(crate) struct Kick {
     /// Folder for report.html and kick.mcap
     #[arg(long, value_name = "FOLDER", default_value = "out/kick")]
     out: PathBuf,
-    /// Kick on request with this engine (dynamic, dynamic-open) in place of playing a reference
+    /// Kick on request with this engine, as `instep bench` names them, in place of playing a reference
     #[arg(long, value_name = "ENGINE", conflicts_with_all = ["reference", "start", "duration"])]
     engine: Option<String>,
     /// With --engine: direction of the ball, in degrees from straight ahead to the left
@@ -65,7 +66,7 @@ pub(crate) struct Kick {
     /// With --engine: speed of the ball, in m/s
     #[arg(long, value_name = "SPEED", allow_negative_numbers = true, requires = "engine", default_value_t = 1.0)]
     speed: f64,
-    /// With --engine: a file of requests (a JSON array, or one JSON object a line) in place of --ball
+    /// With --engine: a file of requests (a JSON array, or one JSON object a line) in place of --ball; writes no report
     #[arg(long, value_name = "FILE", requires = "engine", conflicts_with_all = ["ball", "direction", "speed"])]
     requests: Option<PathBuf>,
     /// Constants of the world, as TOML; what is absent keeps its default
@@ -96,16 +97,29 @@ pub(crate) fn degrees(text: &str) -> Result<f64, String> {
 /// Everything about one kick that was tried.
 struct Tried {
     robot: Arc<Robot>,
-    reference: Arc<Reference>,
-    reference_file: PathBuf,
-    /// The policy's file, where one ran.
-    policy: Option<PathBuf>,
-    /// Where in the reference it started, s.
-    start: f64,
+    source: Source,
     settings: TrialSettings,
     trial: Trial,
     report: PathBuf,
     recording: PathBuf,
+}
+
+/// What a kick came from.
+enum Source {
+    /// A reference.
+    Followed(Arc<Followed>),
+    /// A request to an engine.
+    Asked { engine: String, request: KickRequest, plan: KickPlan },
+}
+
+/// A reference that was followed.
+struct Followed {
+    reference: Arc<Reference>,
+    file: PathBuf,
+    /// The policy's file, where one ran.
+    policy: Option<PathBuf>,
+    /// Where in the reference it started, s.
+    start: f64,
 }
 
 impl Kick {
@@ -147,9 +161,11 @@ impl Kick {
         };
         let trial = trial::run(&robot, &settings, controller.as_mut())?;
         let policy = self.reference.is_none().then_some(self.policy);
-        let tried = Tried { robot, reference, reference_file, policy, start, settings, trial, report, recording };
+        let followed = Arc::new(Followed { reference, file: reference_file, policy, start });
+        let source = Source::Followed(Arc::clone(&followed));
+        let tried = Tried { robot, source, settings, trial, report, recording };
         tried.write()?;
-        output.show(&Measures::new(&tried), |paint| summary::text(&tried, paint))?;
+        output.show(&Measures::new(&tried, &followed), |paint| summary::text(&tried, paint))?;
         Ok(ExitCode::SUCCESS)
     }
 }
@@ -207,7 +223,7 @@ impl Kick {
             (None, None) => return Err(Failure::input("--ball: where is the ball? such as --ball 0.2,-0.05")),
         };
         let world = self.world.as_deref().map(world_settings).transpose()?;
-        engine::run(&subject, engine, &requests, world, self.seed, output)
+        engine::run(&subject, engine, &requests, world, self.seed, &self.out, output)
     }
 }
 
@@ -227,22 +243,49 @@ impl Tried {
         batch.commit()
     }
 
-    /// What steered the robot, in words.
-    fn steered(&self) -> String {
-        self.policy.as_ref().map_or_else(
-            || "open loop".into(),
-            |file| format!("followed by the policy {}", file.file_name().unwrap_or_default().to_string_lossy()),
-        )
+    /// The reference that was followed, if one was.
+    fn followed(&self) -> Option<&Followed> {
+        match &self.source {
+            Source::Followed(followed) => Some(followed),
+            Source::Asked { .. } => None,
+        }
     }
 
-    /// How the reference was made, in words.
-    fn kind(&self) -> &'static str {
-        match self.reference.kind {
+    /// The foot that was to kick.
+    fn foot(&self) -> Side {
+        match &self.source {
+            Source::Followed(followed) => followed.reference.phases.kick_foot,
+            Source::Asked { plan, .. } => plan.foot,
+        }
+    }
+
+    /// What steered the robot, in words.
+    fn steered(&self) -> String {
+        match &self.source {
+            Source::Followed(followed) => followed.steered(),
+            Source::Asked { engine, request, plan } => {
+                let (foot, face) = (plan.foot, format!("{:?}", plan.face).to_lowercase());
+                let angle = request.direction.to_degrees();
+                format!("engine {engine}, {foot} foot ({face}), asked for {angle:.1} degrees to the left")
+            }
+        }
+    }
+}
+
+impl Followed {
+    fn steered(&self) -> String {
+        let by = self.policy.as_ref().map_or_else(
+            || "open loop".into(),
+            |file| format!("followed by the policy {}", file.file_name().unwrap_or_default().to_string_lossy()),
+        );
+        let kind = match self.reference.kind {
             ReferenceKind::KinematicSlip => "kinematic, the clip's foot slip kept",
             ReferenceKind::Kinematic => "kinematic, stance feet still",
             ReferenceKind::Kinodynamic => "kinodynamic",
             ReferenceKind::Infeasible => "kinodynamic, but not feasible",
-        }
+        };
+        let name = self.file.file_name().unwrap_or_default().to_string_lossy();
+        format!("{name} ({kind}), {by} from {:.3} s", self.start)
     }
 }
 
@@ -287,8 +330,8 @@ struct Measures<'a> {
 }
 
 impl<'a> Measures<'a> {
-    fn new(tried: &'a Tried) -> Self {
-        let trial = &tried.trial;
+    fn new(tried: &'a Tried, followed: &'a Followed) -> Self {
+        let (trial, settings) = (&tried.trial, &tried.settings);
         let impact = trial.impact.as_ref();
         Self {
             ball_speed: impact.map(|i| i.ball_speed()),
@@ -309,18 +352,18 @@ impl<'a> Measures<'a> {
             rerun_ball_speed: trial.audit.rerun_ball_speed,
             energy_gain: trial.audit.energy_gain,
             support_slip: trial.support_slip,
-            ball_start: tried.settings.ball.position,
+            ball_start: settings.ball.position,
             ball_end: trial.ball_end,
             groups: &trial.groups,
             segments: &trial.segments,
             robot: &tried.robot.name,
-            reference: &tried.reference_file,
-            policy: tried.policy.as_deref(),
-            reference_kind: tried.reference.kind,
-            reference_start: tried.start,
-            reference_duration: tried.reference.duration(),
-            duration: tried.settings.duration,
-            seed: tried.settings.seed,
+            reference: &followed.file,
+            policy: followed.policy.as_deref(),
+            reference_kind: followed.reference.kind,
+            reference_start: followed.start,
+            reference_duration: followed.reference.duration(),
+            duration: settings.duration,
+            seed: settings.seed,
             report: &tried.report,
             recording: &tried.recording,
         }

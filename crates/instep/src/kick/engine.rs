@@ -1,17 +1,19 @@
 //! `instep kick --engine`: one request, or a file of them, planned by an engine and tried in the world.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use instep_bench::Subject;
-use instep_bench::cell::{Kicked, run_case};
+use instep_bench::cell::{Kicked, Ran, run_case};
 use instep_bench::scenario::Case;
 use instep_kick::{KickRequest, Strength};
 use instep_sim::World;
 use instep_sim::settings::{ModelError, WorldSettings};
 use serde::Serialize;
 
+use super::{Source, Tried, summary};
 use crate::failure::Failure;
+use crate::files;
 use crate::output::Output;
 
 /// What `--json` prints for each request.
@@ -24,6 +26,9 @@ struct Answer {
     kicked: Option<Kicked>,
     direction_error_deg: Option<f64>,
     plan_s: f64,
+    /// Report and recording, where there was one request and it was not refused.
+    report: Option<PathBuf>,
+    recording: Option<PathBuf>,
 }
 
 #[derive(Debug, Serialize)]
@@ -42,7 +47,7 @@ pub(super) struct Wanted {
     pub(super) speed: f64,
 }
 
-/// Runs `requests` one after the other, each from the stand.
+/// Runs `requests` one after the other, each from the stand; a single one is shown in a report under `out`.
 ///
 /// # Errors
 /// When engine or world cannot be made, or a simulation diverges. A refusal is an answer.
@@ -52,14 +57,22 @@ pub(super) fn run(
     requests: &[KickRequest],
     world: Option<WorldSettings>,
     seed: u64,
+    out: &Path,
     output: &Output,
 ) -> Result<ExitCode, Failure> {
+    let (report, recording) = (out.join("report.html"), out.join("kick.mcap"));
+    if requests.len() == 1 {
+        for file in [&report, &recording] {
+            files::check_file(file)?;
+        }
+    }
     let mut settings = world.unwrap_or_else(|| subject.world());
     settings.ball = subject.world().ball;
     let mut world = World::new(subject.robot.clone(), &settings)?;
     let mut answers = Vec::with_capacity(requests.len());
+    let mut shown = None;
     for request in requests {
-        let mut engine = subject.engine(engine)?;
+        let mut planner = subject.engine(engine)?;
         let case = Case {
             request: *request,
             ball: request.ball.map(|v| if v.is_finite() { v } else { 1.0 }),
@@ -70,13 +83,24 @@ pub(super) fn run(
             ball_moved: None,
             seed,
         };
-        let (outcome, plan_s, _) = run_case(subject, &case, engine.as_mut(), &mut world, &mut Vec::new())?;
+        let (outcome, plan_s, ran) = run_case(subject, &case, planner.as_mut(), &mut world, &mut Vec::new())?;
         let refused = outcome.as_ref().err().map(|r| Refused { cause: r.name(), message: r.explain(&subject.robot) });
         let kicked = outcome.ok();
         let direction_error_deg = kicked.and_then(|k| k.direction_error).map(f64::to_degrees);
-        answers.push(Answer { request: *request, refused, kicked, direction_error_deg, plan_s });
+        let ran = ran.filter(|_| requests.len() == 1);
+        let files = ran.as_ref().map(|_| (report.clone(), recording.clone())).unzip();
+        let (report, recording) = files.clone();
+        answers.push(Answer { request: *request, refused, kicked, direction_error_deg, plan_s, report, recording });
+        if let (Some(Ran { plan, settings, trial }), (Some(report), Some(recording))) = (ran, files) {
+            let source = Source::Asked { engine: engine.to_owned(), request: *request, plan };
+            let tried = Tried { robot: subject.robot.clone(), source, settings, trial, report, recording };
+            tried.write()?;
+            shown = Some(tried);
+        }
     }
-    output.show(&serde_json::json!({ "requests": answers }), |_| answers.iter().map(line).collect())?;
+    output.show(&serde_json::json!({ "requests": answers }), |paint| {
+        shown.as_ref().map_or_else(|| answers.iter().map(line).collect(), |tried| summary::text(tried, paint))
+    })?;
     Ok(ExitCode::SUCCESS)
 }
 

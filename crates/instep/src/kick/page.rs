@@ -1,4 +1,4 @@
-//! The report of a kick: the replay with the reference as a ghost, the measures, and plots of everything recorded.
+//! The report of a kick: the replay, with the reference as a ghost where one was followed, the measures, and plots of everything recorded.
 
 use instep_motion::phase::Side;
 use instep_motion::reference::Knot;
@@ -6,10 +6,10 @@ use instep_report::{
     Arrow, ArrowFrame, Cell, Color, Column, Event, Limit, Pitch, Plot, Region, Replay, Report, Series, SummaryItem,
     Table, Verdict,
 };
-use instep_robot::LinkPoint;
+use instep_robot::{LinkPoint, Robot};
 use nalgebra::Vector3;
 
-use super::{Tried, summary};
+use super::{Followed, Source, Tried, summary};
 use crate::figure::{self, Figure};
 
 /// Frames of the replay are this far apart, s; around the impact every sample is shown.
@@ -25,16 +25,13 @@ pub(super) fn page(tried: &Tried) -> Report {
         Some(_) => format!("{name} kicks, but the impact is not to be believed"),
         None => format!("{name} misses the ball"),
     };
-    let file = tried.reference_file.file_name().unwrap_or_default().to_string_lossy();
     let ball = tried.settings.ball.position;
     Report {
         title,
         subtitle: format!(
-            "{} \u{b7} {file} ({}), {} from {:.3} s \u{b7} ball at ({:.3}, {:.3}) m \u{b7} seed {}",
+            "{} \u{b7} {} \u{b7} ball at ({:.3}, {:.3}) m \u{b7} seed {}",
             tried.robot.title,
-            tried.kind(),
             tried.steered(),
-            tried.start,
             ball[0],
             ball[1],
             tried.settings.seed,
@@ -67,7 +64,8 @@ fn items(tried: &Tried) -> Vec<SummaryItem> {
                 note.unwrap_or_default(),
             ));
             let direction = trial.direction_error.map(summary::direction).unwrap_or_default();
-            items.push(SummaryItem::new("Direction", direction, Verdict::Neutral, "away from straight ahead"));
+            let from = if tried.followed().is_some() { "straight ahead" } else { "what was asked" };
+            items.push(SummaryItem::new("Direction", direction, Verdict::Neutral, format!("away from {from}")));
             let speed = format!("{:.2} m/s", impact.foot_speed);
             items.push(SummaryItem::new("Foot speed", speed, Verdict::Neutral, impact.link.clone()));
             let mass = format!("{:.2} kg", impact.effective_mass);
@@ -174,15 +172,19 @@ fn replay(tried: &Tried) -> Replay {
     let positions = frames.iter().map(|&i| record.row(&record.q, i));
     let mut actor = body.actor("Robot", &mut data, positions, |color| color);
     actor.arrows = arrows(tried, &frames);
-    let reference: Vec<Vec<f64>> = frames.iter().map(|&i| reference_position(tried, record.times[i])).collect();
-    let ghost = |_| Color::rgb(0x7f8ea3).with_alpha(0.25);
-    let ghost = body.actor("Reference", &mut data, reference.iter().map(Vec::as_slice), ghost);
+    let mut actors = vec![actor];
+    if let Some(followed) = tried.followed() {
+        let position = |&i: &usize| reference_position(&tried.robot, followed, record.times[i]);
+        let reference: Vec<Vec<f64>> = frames.iter().map(position).collect();
+        let ghost = |_| Color::rgb(0x7f8ea3).with_alpha(0.25);
+        actors.push(body.actor("Reference", &mut data, reference.iter().map(Vec::as_slice), ghost));
+    }
     let ball = frames.iter().map(|&i| (record.ball[i].position, record.ball[i].orientation));
-    let ball = figure::ball(tried.settings.world.ball.radius, ball);
+    actors.push(figure::ball(tried.settings.world.ball.radius, ball));
     let event = |(time, label): (f64, &str)| Event { time, label: label.into() };
     Replay {
         times: frames.iter().map(|&i| record.times[i]).collect(),
-        actors: vec![actor, ghost, ball],
+        actors,
         events: summary::events(&tried.trial).into_iter().map(event).collect(),
         pitch: Some(Pitch::kid_size()),
         camera: None,
@@ -190,12 +192,12 @@ fn replay(tried: &Tried) -> Replay {
 }
 
 /// The reference's position at the trial's time `time`, in the robot's order.
-fn reference_position(tried: &Tried, time: f64) -> Vec<f64> {
+fn reference_position(robot: &Robot, followed: &Followed, time: f64) -> Vec<f64> {
     let mut knot = Knot::default();
-    tried.reference.sample_into(tried.start + time, &mut knot);
+    followed.reference.sample_into(followed.start + time, &mut knot);
     let mut q = [&knot.base_position[..], &knot.base_orientation].concat();
-    let place = |name: &str| tried.reference.joint_index(name).map_or(0.0, |i| knot.joints[i]);
-    q.extend(tried.robot.joints.iter().map(|joint| place(&joint.name)));
+    let place = |name: &str| followed.reference.joint_index(name).map_or(0.0, |i| knot.joints[i]);
+    q.extend(robot.joints.iter().map(|joint| place(&joint.name)));
     q
 }
 
@@ -277,9 +279,10 @@ fn plots(tried: &Tried) -> Vec<Plot> {
 
 /// The reference's phases in the trial's time.
 fn regions(tried: &Tried) -> Vec<Region> {
-    let phases = &tried.reference.phases;
+    let Some(followed) = tried.followed() else { return Vec::new() };
+    let phases = &followed.reference.phases;
     let end = tried.settings.duration;
-    let at = |time: f64| (time - tried.start).clamp(0.0, end);
+    let at = |time: f64| (time - followed.start).clamp(0.0, end);
     let region = |label: &str, from: f64, to: f64| Region { label: label.into(), from: at(from), to: at(to) };
     let mut regions = vec![region("swing", phases.t_swing, phases.t_impact)];
     regions.retain(|region| region.to > region.from);
@@ -294,7 +297,7 @@ struct Motion {
 /// Forward speeds of the kicking leg's parts, and how high the robot stands.
 fn motion(tried: &Tried) -> Motion {
     let (robot, record) = (&tried.robot, &tried.trial.record);
-    let leg = robot.leg(tried.reference.phases.kick_foot);
+    let leg = robot.leg(tried.foot());
     let mut links = vec![("pelvis", robot.base), ("thigh", leg.thigh), ("shank", leg.shank), ("foot", leg.foot)];
     links.extend(leg.toe_link.map(|toe| ("toe", toe)));
     let forward = Vector3::new(tried.settings.direction.cos(), tried.settings.direction.sin(), 0.0);
@@ -310,33 +313,42 @@ fn motion(tried: &Tried) -> Motion {
         base.push(record.row(&record.q, i)[2]);
         com.push(data.com().z);
     }
-    let mut knot = Knot::default();
-    let planned = record.times.iter().map(|time| {
-        tried.reference.sample_into(tried.start + time, &mut knot);
-        knot.base_position[2]
-    });
-    let planned = Series::shared("base, reference", planned.collect()).colored(Color::rgb(0x8a96a6)).dashed();
+    let mut heights = vec![Series::shared("centre of mass", com), Series::shared("base", base)];
+    if let Some(followed) = tried.followed() {
+        let mut knot = Knot::default();
+        let planned = record.times.iter().map(|time| {
+            followed.reference.sample_into(followed.start + time, &mut knot);
+            knot.base_position[2]
+        });
+        let planned = Series::shared("base, reference", planned.collect());
+        heights.push(planned.colored(Color::rgb(0x8a96a6)).dashed());
+    }
     Motion {
         segments: links.iter().zip(speeds).map(|((name, _), speeds)| Series::shared(*name, speeds)).collect(),
-        heights: vec![Series::shared("centre of mass", com), Series::shared("base", base), planned],
+        heights,
     }
 }
 
 fn notes(tried: &Tried) -> Vec<String> {
     let step = &tried.settings.world.step;
-    vec![
-        format!("The reference was {}.", summary::start(tried)),
-        match tried.policy {
-            None => {
-                "The reference is played open loop: joint angles and speeds go to the drives as they stand in it. \
-                 Nothing keeps the robot in balance, and what a motor cannot give is lost."
-            }
-            Some(_) => {
-                "The policy corrects the reference's joint angles 50 times a second from what its sensors tell: \
-                 encoders, inertial sensor, foot pressure and a sight of the ball."
-            }
+    let from = match &tried.source {
+        Source::Followed(_) => format!("The reference was {}.", summary::start(tried)),
+        Source::Asked { .. } => format!("The kick started {}.", summary::start(tried)),
+    };
+    let how = match &tried.source {
+        Source::Followed(followed) if followed.policy.is_none() => {
+            "The reference is played open loop: joint angles and speeds go to the drives as they stand in it. Nothing \
+             keeps the robot in balance, and what a motor cannot give is lost."
         }
-        .into(),
+        Source::Followed(_) => {
+            "The policy corrects the reference's joint angles 50 times a second from what its sensors tell: encoders, \
+             inertial sensor, foot pressure and a sight of the ball."
+        }
+        Source::Asked { .. } => "The engine planned the kick when it was asked, and sees only the robot's sensors.",
+    };
+    let mut notes = vec![
+        from,
+        how.into(),
         format!(
             "Time step {} ms, {} ms while the ball is near a foot. Ball speed is that at the last contact of the \
              first impact. The audit: kinetic energy may not grow by more than motors and gravity gave, effective \
@@ -349,6 +361,9 @@ fn notes(tried: &Tried) -> Vec<String> {
         "A fall is a base tilted by more than 60\u{b0} or at less than half its standing height, or any part but a \
          foot on the ground."
             .into(),
-        format!("Motion data: {}", tried.reference.source.acknowledgement),
-    ]
+    ];
+    if let Some(followed) = tried.followed() {
+        notes.push(format!("Motion data: {}", followed.reference.source.acknowledgement));
+    }
+    notes
 }

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use instep_sim::trial::{GroupPeak, Trial};
 use nalgebra::Vector3;
 
-use super::Tried;
+use super::{Source, Tried};
 use crate::output::Paint;
 
 /// Moments worth a mark, in time order: (s, what).
@@ -19,8 +19,17 @@ pub(super) fn events(trial: &Trial) -> Vec<(f64, &'static str)> {
 
 /// Where the kick started, and what was therefore not tried.
 pub(super) fn start(tried: &Tried) -> String {
+    let followed = match &tried.source {
+        Source::Followed(followed) => followed,
+        Source::Asked { plan, .. } => {
+            return format!(
+                "from the stand, contact forecast at {:.2} s with {:.2} m/s",
+                plan.contact, plan.ball_speed
+            );
+        }
+    };
     let q_speed = Vector3::new(tried.settings.v[0], tried.settings.v[1], tried.settings.v[2]).norm();
-    let (start, end) = (tried.start, tried.reference.duration());
+    let (start, end) = (followed.start, followed.reference.duration());
     if start == 0.0 {
         format!("played from its beginning, with the base already moving at {q_speed:.2} m/s")
     } else {
@@ -67,9 +76,8 @@ pub(super) fn text(tried: &Tried, paint: Paint) -> String {
 
 fn write_all(out: &mut String, tried: &Tried, paint: Paint) -> std::fmt::Result {
     let (trial, robot) = (&tried.trial, &tried.robot);
-    let name = tried.reference_file.file_name().unwrap_or_default().to_string_lossy();
     writeln!(out, "{}", paint.strong(&robot.title))?;
-    writeln!(out, "{name} ({}), {}", tried.kind(), tried.steered())?;
+    writeln!(out, "{}", tried.steered())?;
     writeln!(out, "{}\n", paint.faint(&start(tried).replacen("; ", ";\n", 1)))?;
 
     let row = |label: &str, value: String| format!("  {} {value}\n", paint.faint(&format!("{label:<15}")));

@@ -8,6 +8,7 @@
 )]
 
 mod bad_input;
+mod engine;
 mod kick;
 mod learn;
 mod retarget;
