@@ -61,6 +61,8 @@ pub enum Face {
     Inner,
     /// The side away from it.
     Outer,
+    /// The heel.
+    Back,
     /// A rounded front corner, the foot turned less than the kick.
     Corner,
 }

@@ -197,6 +197,28 @@ impl Ik {
         })
     }
 
+    /// As [`Ik::new`] for the leg on `side` alone, which follows the swing sole's goals; the base, the other leg and joints
+    /// that share a motor with it stay where they are.
+    ///
+    /// # Errors
+    /// As [`Ik::new`].
+    pub fn of_leg(
+        robot: &Robot,
+        coupled: &[[String; 2]],
+        margin: f64,
+        bend: f64,
+        side: Side,
+    ) -> Result<Self, KickError> {
+        let mut ik = Self::new(robot, coupled, margin, bend)?;
+        let of_leg = |joints: &[Option<usize>; 2]| {
+            joints[1].is_none() && joints[0].is_some_and(|joint| robot.leg(side).joints().any(|j| j == joint))
+        };
+        ik.ranges = ik.unknowns.iter().zip(&ik.ranges).filter(|(joints, _)| of_leg(joints)).map(|(_, r)| *r).collect();
+        ik.unknowns.retain(of_leg);
+        ik.weights = Weights { height: 0.0, tilt: 0.0, yaw: 0.0, balance: 0.0, ..ik.weights };
+        Ok(ik)
+    }
+
     /// The joints that it moves.
     pub fn joints(&self) -> impl Iterator<Item = usize> {
         self.unknowns.iter().flatten().flatten().copied()

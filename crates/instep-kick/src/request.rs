@@ -170,6 +170,16 @@ pub enum Refusal {
         /// Index of that joint.
         joint: usize,
     },
+    /// The engine's strongest kick is weaker.
+    #[error("{asked:.2} m/s at the {foot} foot is asked, the engine's settings give {most:.2} m/s at most")]
+    TooStrong {
+        /// The foot.
+        foot: Side,
+        /// Foot speed asked, m/s.
+        asked: f64,
+        /// Largest foot speed, m/s.
+        most: f64,
+    },
     /// The motors cannot hold the robot on one foot in a pose on the way.
     #[error("with the {foot} foot the joint {joint} would have to hold {share:.2} times what its motor can")]
     TooHeavy {
@@ -249,6 +259,7 @@ impl Refusal {
             Self::Unreachable { .. } => "unreachable",
             Self::SelfCollision { .. } => "self_collision",
             Self::TooFast { .. } => "too_fast",
+            Self::TooStrong { .. } => "too_strong",
             Self::TooHeavy { .. } => "too_heavy",
             Self::OffBalance { .. } => "off_balance",
             Self::TooLate { .. } => "too_late",

@@ -570,6 +570,7 @@ fn is_reach(refusal: &Refusal) -> bool {
         | Refusal::Unreachable { .. }
         | Refusal::SelfCollision { .. }
         | Refusal::TooFast { .. }
+        | Refusal::TooStrong { .. }
         | Refusal::TooHeavy { .. }
         | Refusal::OffBalance { .. } => true,
         Refusal::NotFinite { .. }

@@ -250,7 +250,7 @@ impl Planner {
         let mut cost = 0.4 * yaw.abs() / FRAC_PI_4
             + match face {
                 Face::Front => 0.0,
-                Face::Inner | Face::Outer => 0.3,
+                Face::Inner | Face::Outer | Face::Back => 0.3,
                 Face::Corner => 0.5,
             };
         cost -= if paper_choice(request.ball, request.direction, s.corridor) == swing { 0.15 } else { 0.0 };

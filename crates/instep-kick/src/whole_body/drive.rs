@@ -19,7 +19,7 @@ use crate::whole_body::torque::Dynamics;
 /// Steps of inverse kinematics in a tick.
 const TICK_STEPS: usize = 3;
 /// Tilt up to which the support foot counts as flat, rad.
-const STEADY_TILT: f64 = 0.04;
+pub(crate) const STEADY_TILT: f64 = 0.04;
 /// Distance of the centre of pressure from the foot's edge from which on the foot counts as rocking, m.
 const EDGE: f64 = 0.006;
 /// Load (share of the weight) from which a foot's centre of pressure counts.
@@ -214,13 +214,13 @@ pub(crate) fn pressure(feedback: Feedback) -> Loop {
 }
 
 /// The vertical in the base frame.
-fn up(sensors: &Sensors) -> Vector3<f64> {
+pub(crate) fn up(sensors: &Sensors) -> Vector3<f64> {
     let [w, x, y, z] = sensors.orientation;
     UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z)).inverse() * Vector3::z()
 }
 
 /// Whether a centre of pressure is well inside the support foot, toward the swing foot without limit.
-fn inside(body: &Body, at: [f64; 2], support: Side) -> bool {
+pub(crate) fn inside(body: &Body, at: [f64; 2], support: Side) -> bool {
     let foot = &body.feet[support as usize];
     let [back, front] = foot.stand_x;
     let outer = if support == Side::Left { foot.stand_y[1] - at[1] } else { at[1] - foot.stand_y[0] };

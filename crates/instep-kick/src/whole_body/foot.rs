@@ -4,7 +4,7 @@
 //! A face is found from the striking capsules of the foot: those that reach farthest toward the front or a side, within
 //! [`FLUSH`]. Everything is in the plane; heights are kept beside.
 
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::{FRAC_PI_2, PI};
 
 use instep_motion::phase::Side;
 use instep_robot::Robot;
@@ -32,8 +32,8 @@ pub struct FacePoint {
 /// One foot's outline and faces, in its sole's frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Foot {
-    /// Front, inner and outer face.
-    pub faces: [FacePoint; 3],
+    /// Front, inner, outer and back face.
+    pub faces: [FacePoint; 4],
     /// Least and largest x of what stands on the ground, m.
     pub stand_x: [f64; 2],
     /// Least and largest y of what stands on the ground, m.
@@ -83,7 +83,7 @@ impl Foot {
             [low, high]
         };
         Self {
-            faces: [face(0.0), face(-out * FRAC_PI_2), face(out * FRAC_PI_2)],
+            faces: [face(0.0), face(-out * FRAC_PI_2), face(out * FRAC_PI_2), face(PI)],
             stand_x: bounds(ground().map(|p| p.x)),
             stand_y: bounds(ground().map(|p| p.y)),
             outline_x: spread(0),
@@ -99,6 +99,7 @@ impl Foot {
             Face::Front => front,
             Face::Inner => self.faces[1],
             Face::Outer => self.faces[2],
+            Face::Back => self.faces[3],
             // The end of the front capsule is a sphere: it strikes in every direction between front and side.
             Face::Corner => FacePoint {
                 axis: front.axis + Vector3::y() * front.half_width.copysign(turn),
