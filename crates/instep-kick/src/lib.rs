@@ -6,6 +6,7 @@
 //! - [`dynamic`]: paper 2's engine: splines of foot and trunk in the support foot's frame, stabilised by the centre of
 //!   pressure.
 //! - [`whole_body`]: what such engines share: the robot's feet, curves, feed-forward torques, closed loop.
+//! - [`preview`]: paper 5's engine: preview control of the zero-moment point, a kick through a via point.
 //! - [`track`]: a window of a reference on one robot; [`playback`]: plays one open loop; [`feedforward`]: the torques that it needs.
 //! - [`policy`]: runs a network that was trained to follow a reference (paper 1), with its state estimate.
 //! - [`tree`] and [`ik`]: kinematics without MuJoCo, and inverse kinematics with weighted goals under joint limits.
@@ -21,6 +22,7 @@ pub mod feedforward;
 pub mod ik;
 pub mod playback;
 pub mod policy;
+pub mod preview;
 pub mod request;
 pub mod track;
 pub mod tree;

@@ -2,10 +2,12 @@
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
+use std::sync::Arc;
 
-use instep_kick::KickEngine;
-use instep_kick::Playback;
 use instep_kick::policy::PolicyKick;
+use instep_kick::preview::{Com, PreviewKick, PreviewSettings, Stabiliser};
+use instep_kick::{BallModel, KickEngine, KickRequest, Playback};
+use instep_robot::Robot;
 use instep_robot::control::{Controller, JointCommand};
 
 use crate::policy::{policy, prestoe};
@@ -34,24 +36,44 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
+/// Runs a kick, cancelled or not, and counts what its ticks allocate.
+fn allocated(engine: &mut dyn KickEngine, robot: &Robot, request: &KickRequest, cancel: bool) -> usize {
+    let mut sensors = standing(robot);
+    let mut command = JointCommand::zeros(robot.joints.len());
+    let plan = engine.plan(request, &sensors).unwrap();
+    let before = COUNT.get();
+    while sensors.time < plan.duration + 0.5 {
+        if cancel && sensors.time > 0.9 * plan.contact {
+            engine.cancel();
+        }
+        engine.tick(&sensors, &mut command);
+        sensors.time += engine.control_period();
+    }
+    COUNT.get() - before
+}
+
 #[test]
 fn a_tick_allocates_nothing() {
     for name in ["nao", "wolfgang"] {
         for cancel in [false, true] {
             let robot = robot(name);
-            let mut engine = engine(name);
-            let mut sensors = standing(&robot);
-            let mut command = JointCommand::zeros(robot.joints.len());
-            let plan = engine.plan(&request(name), &sensors).unwrap();
-            let before = COUNT.get();
-            while sensors.time < plan.duration + 0.5 {
-                if cancel && sensors.time > 0.9 * plan.contact {
-                    engine.cancel();
-                }
-                engine.tick(&sensors, &mut command);
-                sensors.time += engine.control_period();
-            }
-            assert_eq!(COUNT.get(), before, "{name} allocated in a tick");
+            assert_eq!(allocated(&mut engine(name), &robot, &request(name), cancel), 0, "{name} allocated in a tick");
+        }
+    }
+}
+
+#[test]
+fn a_tick_of_preview_allocates_nothing() {
+    let robot = robot("nao");
+    let folder = robot.model_file().parent().unwrap();
+    for com in [Com::General, Com::TwoLink] {
+        for cancel in [false, true] {
+            let mut settings = PreviewSettings::load(folder).unwrap();
+            settings.com = com;
+            settings.stabilisers = vec![Stabiliser::Preview, Stabiliser::Pressure, Stabiliser::Inertial];
+            let ball = BallModel::load(folder).unwrap();
+            let mut engine = PreviewKick::new(Arc::clone(&robot), ball, settings).unwrap();
+            assert_eq!(allocated(&mut engine, &robot, &request("nao"), cancel), 0, "{com:?} allocated in a tick");
         }
     }
 }

@@ -6,5 +6,7 @@ mod cancel;
 mod issue_304;
 mod kinematics;
 mod policy;
+mod preview;
 mod refusals;
+mod riccati;
 mod rig;

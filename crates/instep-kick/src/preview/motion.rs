@@ -1,0 +1,254 @@
+//! The phases of a kick: the swing sole's way (quintics to the retraction point, the kick's two cubics, quintics back),
+//! that of the base, and the reference of the zero-moment point, all in the support sole's frame; and the way back to the
+//! stand from any instant.
+
+use instep_motion::phase::Side;
+use instep_motion::spline::State;
+use nalgebra::Vector3;
+
+use crate::engine::Phase;
+use crate::ik::Goals;
+use crate::preview::settings::PreviewSettings;
+use crate::preview::stroke::Stroke;
+use crate::whole_body::body::Body;
+use crate::whole_body::path::Path;
+
+/// Half the step of the differences that give the foot's speed, s.
+const STEP: f64 = 1e-4;
+
+/// A whole motion. Times are the motion's own, s; it stands still where the engine holds it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Motion {
+    pub(crate) swing: Side,
+    /// Sole's x, y, z, yaw, pitch until the retraction point, and from the kick's end on.
+    before: Path<5>,
+    after: Path<5>,
+    /// The kick and its start.
+    kick: Option<(f64, Stroke)>,
+    /// Base height, roll, pitch, yaw; share of the arms' way.
+    trunk: Path<5>,
+    /// Reference of the zero-moment point, x and y.
+    zmp: Path<2>,
+    /// Ends of the phases from [`Phase::Shift`] to [`Phase::ShiftBack`].
+    ends: [f64; 7],
+    pub(crate) contact: Option<f64>,
+}
+
+fn trunk_stand(body: &Body, swing: Side) -> [f64; 5] {
+    let stand = body.stand(swing);
+    let [roll, pitch, yaw] = stand.base;
+    [stand.height, roll, pitch, yaw, 0.0]
+}
+
+/// The trunk over the support foot, with the base's share of the foot's `yaw`.
+pub(crate) fn trunk_support(body: &Body, settings: &PreviewSettings, swing: Side, yaw: f64) -> [f64; 5] {
+    let stand = body.stand(swing);
+    let s = &settings.stance;
+    let [roll, pitch, base_yaw] = stand.base;
+    [
+        stand.height - s.crouch,
+        roll + Body::sign(swing) * s.roll,
+        pitch + s.pitch,
+        base_yaw + settings.swing.base_yaw * yaw,
+        1.0,
+    ]
+}
+
+/// The reference of the zero-moment point in the support sole, m.
+pub(crate) fn zmp_support(settings: &PreviewSettings, swing: Side) -> [f64; 2] {
+    let [x, y] = settings.stance.zmp;
+    [x, Body::sign(swing) * y]
+}
+
+/// The centre of mass of the stand, m: the reference of the zero-moment point on two feet.
+pub(crate) fn zmp_stand(body: &Body, swing: Side) -> [f64; 2] {
+    let com = body.stand(swing).com;
+    [com.x, com.y]
+}
+
+/// Goals from the parts.
+pub(crate) fn goals(foot: &[f64; 5], trunk: &[f64; 5], com: [f64; 2]) -> Goals {
+    Goals {
+        position: Vector3::new(foot[0], foot[1], foot[2]),
+        yaw_pitch: [foot[3], foot[4]],
+        balance: com,
+        height: trunk[0],
+        base: [trunk[1], trunk[2], trunk[3]],
+    }
+}
+
+fn distance(a: &[f64; 5], b: &[f64; 5]) -> f64 {
+    (Vector3::new(a[0], a[1], a[2]) - Vector3::new(b[0], b[1], b[2])).norm()
+}
+
+impl Motion {
+    /// Stands for ever, as seen from the support foot of `swing`.
+    pub(crate) fn standing(body: &Body, swing: Side) -> Self {
+        let foot = Path::starting(0.0, State::at_rest(home(body, swing)));
+        Self {
+            swing,
+            before: foot,
+            after: foot,
+            kick: None,
+            trunk: Path::starting(0.0, State::at_rest(trunk_stand(body, swing))),
+            zmp: Path::starting(0.0, State::at_rest(zmp_stand(body, swing))),
+            ends: [0.0; 7],
+            contact: None,
+        }
+    }
+
+    /// The kick with `stroke`, from the stand to the stand.
+    pub(crate) fn kick(body: &Body, settings: &PreviewSettings, stroke: &Stroke) -> Self {
+        let swing = stroke.swing;
+        let mut motion = Self::standing(body, swing);
+        let times = &settings.times;
+        motion.zmp.hold(0.25 * times.shift);
+        motion.zmp.to(0.5 * times.shift, State::at_rest(zmp_support(settings, swing)));
+        motion.trunk.to(times.shift, State::at_rest(trunk_support(body, settings, swing, 0.0)));
+        motion.before.hold(times.shift);
+        motion.ends[0] = motion.before.end();
+        let lifted = lifted(body, settings, swing);
+        motion.before.to(times.foot_least, State::at_rest(lifted));
+        motion.trunk.hold(times.foot_least);
+        motion.ends[1] = motion.before.end();
+        let retraction = stroke.retraction();
+        let duration = (distance(&retraction, &lifted) / times.foot_speed).max(times.foot_least);
+        motion.before.to(duration, State::at_rest(retraction));
+        motion.trunk.to(duration, State::at_rest(trunk_support(body, settings, swing, stroke.yaw)));
+        motion.before.hold(times.aim);
+        motion.ends[2] = motion.before.end();
+        motion.kick = Some((motion.ends[2], *stroke));
+        motion.contact = Some(motion.ends[2] + stroke.time * stroke.shape.contact);
+        motion.ends[3] = motion.ends[2] + stroke.time;
+        motion.trunk.hold(motion.ends[3] - motion.trunk.end());
+        motion.zmp.hold(motion.ends[3] - motion.zmp.end());
+        motion.after = Path::starting(motion.ends[3], State::at_rest(stroke.end()));
+        motion.back(body, settings);
+        motion
+    }
+
+    /// From where the paths end, foot in the air: over its place, down, and the weight back between the feet.
+    fn back(&mut self, body: &Body, settings: &PreviewSettings) {
+        let times = &settings.times;
+        let lifted = lifted(body, settings, self.swing);
+        let last = self.after.last();
+        let way = distance(&lifted, &last.position);
+        let [vx, vy, vz, ..] = last.velocity;
+        let speed = Vector3::new(vx, vy, vz).norm();
+        // A moving foot needs time to stop: at least what a brake over the follow-through would take.
+        let brake = 2.0 * settings.swing.follow / speed.max(0.1);
+        let stop = if speed > 0.05 { (1.5 * times.foot_least).max(brake.min(0.6)) } else { 0.0 };
+        let duration = (way / times.foot_speed).max(times.foot_least).max(stop);
+        self.after.to(duration, State::at_rest(lifted));
+        self.trunk.to(duration, State::at_rest(trunk_support(body, settings, self.swing, 0.0)));
+        self.ends[4] = self.after.end();
+        self.after.to(times.lower, State::at_rest(home(body, self.swing)));
+        self.trunk.hold(times.lower);
+        self.ends[5] = self.after.end();
+        self.zmp.hold(self.ends[5] - self.zmp.end());
+        self.weight_back(body, times.shift_back);
+    }
+
+    /// From where the paths end, both feet on the ground: the weight back between the feet.
+    fn weight_back(&mut self, body: &Body, duration: f64) {
+        self.trunk.to(duration, State::at_rest(trunk_stand(body, self.swing)));
+        self.zmp.hold(0.25 * duration);
+        self.zmp.to(0.5 * duration, State::at_rest(zmp_stand(body, self.swing)));
+        self.after.hold(duration);
+        self.ends[6] = self.after.end();
+    }
+
+    /// The shortest way back to the stand from `time`, for a cancel.
+    pub(crate) fn cancelled(&self, body: &Body, settings: &PreviewSettings, time: f64) -> Self {
+        let mut motion = *self;
+        let phase = self.phase(time);
+        if matches!(phase, Phase::Stand | Phase::MoveBack | Phase::Lower | Phase::ShiftBack) {
+            return motion;
+        }
+        motion.trunk = Path::starting(time, self.trunk.at(time));
+        motion.zmp = Path::starting(time, State::at_rest(self.zmp.at(time).position));
+        motion.after = Path::starting(time, self.foot_state(time));
+        motion.before = motion.after;
+        motion.kick = None;
+        motion.ends = [time; 7];
+        motion.contact = None;
+        if phase == Phase::Shift {
+            motion.weight_back(body, settings.times.shift_back);
+        } else {
+            motion.back(body, settings);
+        }
+        motion
+    }
+
+    /// Sole's x, y, z, yaw and pitch at `time`.
+    pub(crate) fn foot(&self, time: f64) -> [f64; 5] {
+        match &self.kick {
+            Some((start, stroke)) if time >= *start && time < self.ends[3] => stroke.at(time - start),
+            Some((start, _)) if time < *start => self.before.at(time).position,
+            _ => self.after.at(time).position,
+        }
+    }
+
+    /// The same with speed and acceleration, by differences.
+    fn foot_state(&self, time: f64) -> State<5> {
+        let (a, b, c) = (self.foot(time - STEP), self.foot(time), self.foot(time + STEP));
+        State {
+            position: b,
+            velocity: std::array::from_fn(|i| (c[i] - a[i]) / (2.0 * STEP)),
+            acceleration: std::array::from_fn(|i| (c[i] - 2.0 * b[i] + a[i]) / (STEP * STEP)),
+        }
+    }
+
+    /// Where foot and base are to be at `time`, with the centre of mass at `com` (m).
+    pub(crate) fn goals(&self, time: f64, com: [f64; 2]) -> Goals {
+        goals(&self.foot(time), &self.trunk.at(time).position, com)
+    }
+
+    /// Reference of the zero-moment point at `time`, m.
+    pub(crate) fn zmp(&self, time: f64) -> [f64; 2] {
+        self.zmp.at(time).position
+    }
+
+    /// Share of the arms' way at `time`.
+    pub(crate) fn arms(&self, time: f64) -> f64 {
+        self.trunk.at(time).position[4]
+    }
+
+    /// End, s.
+    pub(crate) fn end(&self) -> f64 {
+        self.ends[6]
+    }
+
+    /// End of a phase, s.
+    pub(crate) fn end_of(&self, phase: Phase) -> f64 {
+        match phase {
+            Phase::Stand => 0.0,
+            _ => self.ends[phase as usize - 1],
+        }
+    }
+
+    /// The phase at `time`.
+    pub(crate) fn phase(&self, time: f64) -> Phase {
+        const PHASES: [Phase; 7] =
+            [Phase::Shift, Phase::Raise, Phase::WindUp, Phase::Kick, Phase::MoveBack, Phase::Lower, Phase::ShiftBack];
+        PHASES.into_iter().zip(self.ends).find(|(_, end)| time < *end).map_or(Phase::Stand, |(phase, _)| phase)
+    }
+
+    /// Whether both feet stand at `time`.
+    pub(crate) fn both_feet(&self, time: f64) -> bool {
+        matches!(self.phase(time), Phase::Stand | Phase::Shift | Phase::ShiftBack)
+    }
+}
+
+/// The foot on its place.
+fn home(body: &Body, swing: Side) -> [f64; 5] {
+    let stand = body.stand(swing);
+    let [yaw, pitch] = stand.yaw_pitch;
+    [stand.home.x, stand.home.y, stand.home.z, yaw, pitch]
+}
+
+/// The foot over its place.
+fn lifted(body: &Body, settings: &PreviewSettings, swing: Side) -> [f64; 5] {
+    let [x, y, _, yaw, pitch] = home(body, swing);
+    [x, y, settings.swing.lift, yaw, pitch]
+}
