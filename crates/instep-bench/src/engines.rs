@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use instep_kick::dynamic::{DynamicKick, DynamicSettings};
+use instep_kick::preview::{PreviewKick, PreviewSettings};
 use instep_kick::{BallModel, KickEngine};
 use instep_robot::Robot;
 use instep_sim::settings::{Ball, WorldSettings};
@@ -32,9 +33,16 @@ const ENTRIES: &[Entry] = &[
         file: "dynamic.toml",
         make: |subject, text| subject.dynamic(text, |settings| settings.feedback.on = false),
     },
+    Entry { name: "preview", file: "preview.toml", make: |subject, text| subject.preview("preview.toml", text) },
+    Entry {
+        name: "preview-tuned",
+        file: "preview-tuned.toml",
+        make: |subject, text| subject.preview("preview-tuned.toml", text),
+    },
 ];
 
-/// Names of the engines; `dynamic-open` is `dynamic` with its closed loop off.
+/// Names of the engines; `dynamic-open` is `dynamic` with its closed loop off, `…-tuned` an engine with the settings that
+/// `instep tune` found.
 pub fn engines() -> impl Iterator<Item = &'static str> {
     ENTRIES.iter().map(|entry| entry.name)
 }
@@ -159,6 +167,11 @@ impl Subject {
         let mut settings = DynamicSettings::parse(&file, text)?;
         change(&mut settings);
         Ok(Box::new(DynamicKick::new(Arc::clone(&self.robot), self.ball, settings)?))
+    }
+
+    fn preview(&self, file: &str, text: &str) -> Made {
+        let settings = PreviewSettings::parse(&self.folder.join(file).display().to_string(), text)?;
+        Ok(Box::new(PreviewKick::new(Arc::clone(&self.robot), self.ball, settings)?))
     }
 }
 
