@@ -20,6 +20,7 @@ mod retarget;
 mod robot;
 mod ros;
 mod train;
+mod tune;
 
 use std::process::ExitCode;
 
@@ -57,6 +58,8 @@ enum Command {
     Ros(ros::Ros),
     /// Train a policy that follows a reference, or that kicks the ball with it
     Train(train::Train),
+    /// Find an engine's settings for a robot by CMA-ES
+    Tune(tune::Tune),
 }
 
 fn main() -> ExitCode {
@@ -72,6 +75,7 @@ fn main() -> ExitCode {
         Command::Robot(command) => command.run(&output),
         Command::Ros(ros) => ros.run(&output),
         Command::Train(train) => train.run(&output),
+        Command::Tune(tune) => tune.run(&output),
     };
     match done {
         Ok(code) => code,

@@ -66,6 +66,15 @@ pub(crate) fn policy(path: &Path) -> Result<PathBuf, Failure> {
     existing_file("--policy", found.as_deref().unwrap_or(path), "a policy (safetensors), as `instep train` writes it")
 }
 
+/// The tuning file that the user means: a path, or one of the shipped ones as `tuning/<name>.toml`.
+///
+/// # Errors
+/// When there is none.
+pub(crate) fn tuning(path: &Path) -> Result<PathBuf, Failure> {
+    let found = if path.is_relative() { find(path) } else { None };
+    existing_file("--tuning", found.as_deref().unwrap_or(path), "a tuning file (TOML)")
+}
+
 /// The folder of KickBench's scenarios.
 ///
 /// # Errors

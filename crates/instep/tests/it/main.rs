@@ -14,3 +14,4 @@ mod learn;
 mod retarget;
 mod robot;
 mod support;
+mod tune;

@@ -1,0 +1,84 @@
+//! `instep tune`: what it refuses, and a small tuning from start to end.
+
+use std::path::Path;
+
+use crate::support::{assert_refused, instep, listing, object};
+
+const GOOD: &str = r#"title = "small"
+scenario = "straight"
+cases = 1
+population = 4
+generations = 1
+step = 0.2
+settled = 0.0
+
+[[parameter]]
+name = "kick.time"
+bounds = [0.25, 0.4]
+"#;
+
+fn write(folder: &Path, text: &str) {
+    std::fs::write(folder.join("t.toml"), text).unwrap();
+}
+
+fn arguments<'a>(more: &[&'a str]) -> Vec<&'a str> {
+    [&["tune", "preview", "--robot", "nao", "--tuning", "t.toml", "--trials", "1"], more].concat()
+}
+
+#[test]
+fn what_cannot_be_tuned_is_refused_with_its_place() {
+    let folder = tempfile::tempdir().unwrap();
+    for (from, to, words) in [
+        ("[0.25, 0.4]", "[0.4, 0.25]", &["t.toml", "bounds of kick.time", "[0.4, 0.25]", "the first below"][..]),
+        ("[0.25, 0.4]", "[0.3, 0.3]", &["bounds of kick.time", "[0.3, 0.3]"]),
+        ("[0.25, 0.4]", "[]", &["t.toml", "bounds"]),
+        ("[0.25, 0.4]", "[nan, 0.4]", &["bounds of kick.time", "NaN"]),
+        ("[0.25, 0.4]", "[-1.0, 0.4]", &["bounds of kick.time", "-1", "[0.05, 3]"]),
+        ("kick.time", "kick.tiem", &["parameter[0].name", "kick.tiem", "did you mean \"kick.time\""]),
+        ("kick.time", "com", &["parameter[0].name", "\"com\"", "the path of a number"]),
+        ("population = 4", "population = 2", &["population", "2", "from 4"]),
+        ("\"straight\"", "\"crooked\"", &["scenario", "crooked", "straight"]),
+        ("step = 0.2", "stride = 0.2", &["t.toml", "stride"]),
+    ] {
+        write(folder.path(), &GOOD.replace(from, to));
+        let before = listing(folder.path());
+        assert_refused(&instep(folder.path(), &arguments(&[])), words, folder.path(), &before);
+    }
+    write(folder.path(), GOOD);
+    let before = listing(folder.path());
+    for (arguments, words) in [
+        (vec!["tune", "previw", "--robot", "nao", "--tuning", "t.toml"], &["previw", "preview"][..]),
+        (vec!["tune", "preview", "--robot", "prestoe", "--tuning", "t.toml"], &["prestoe", "preview.toml"]),
+        (vec!["tune", "preview", "--robot", "nao", "--tuning", "no.toml"], &["no.toml", "--tuning"]),
+        (arguments(&["--out", "t.toml"]), &["t.toml"]),
+        (arguments(&["--resume"]), &["checkpoint.json", "cannot be read"]),
+    ] {
+        assert_refused(&instep(folder.path(), &arguments), words, folder.path(), &before);
+    }
+}
+
+#[test]
+fn an_objective_that_no_sample_has_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    // A miss of a tenth of a millimetre is too much for any kick.
+    write(folder.path(), &GOOD.replace("kick.time", "limits.clearance").replace("[0.25, 0.4]", "[0.09, 0.1]"));
+    let output = instep(folder.path(), &arguments(&[]));
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{error}");
+    assert!(error.contains("not a number for any of the 4 samples") && error.contains("4 refused"), "{error}");
+}
+
+#[test]
+fn a_small_tuning_leaves_settings_a_report_and_a_checkpoint() {
+    let folder = tempfile::tempdir().unwrap();
+    write(folder.path(), GOOD);
+    let first = object(&instep(folder.path(), &arguments(&["--json", "--out", "o"])));
+    assert_eq!(first["tuned"]["names"][0], "kick.time");
+    assert_eq!(first["tuned"]["measured"][1]["cases"], 1);
+    let read = |name: &str| std::fs::read_to_string(folder.path().join("o").join(name)).unwrap();
+    assert!(read("settings.toml").contains("[kick]") && read("report.html").contains("<html"));
+    // Resumed, it has nothing left to search and ends the same.
+    let again = object(&instep(folder.path(), &arguments(&["--json", "--out", "o", "--resume"])));
+    assert_eq!(first["tuned"]["values"], again["tuned"]["values"]);
+    assert_eq!(first["tuned"]["measured"], again["tuned"]["measured"]);
+}
