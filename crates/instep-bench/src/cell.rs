@@ -5,7 +5,9 @@
 
 use std::sync::Arc;
 
-use instep_kick::{KickEngine, KickPlan, Refusal};
+use instep_kick::{BreakOff, KickEngine, KickPlan, Phase, Refusal};
+use instep_motion::phase::Side;
+use instep_robot::Robot;
 use instep_robot::control::{Controller, JointCommand, Sensors};
 use instep_sim::sensors::SensorSuite;
 use instep_sim::trial::{Disturbance, Trial, TrialSettings, run_disturbed};
@@ -62,6 +64,24 @@ pub struct Kicked {
     pub audit_invalid: bool,
     /// Joints beyond their limits.
     pub violations: usize,
+    /// The direction as the scenario says it, rad: positive toward the middle line, as seen from the ball's side.
+    #[serde(default)]
+    pub turn: f64,
+    /// Direction error in the same sense, rad.
+    #[serde(default)]
+    pub turn_error: Option<f64>,
+    /// The engine's forecast g of the direction, where it has one.
+    #[serde(default)]
+    pub forecast: Option<f64>,
+    /// The standard deviation of the direction that the plan stated, rad.
+    #[serde(default)]
+    pub precision: f64,
+    /// Samples at which the kicking foot touched the ground while it was to swing.
+    #[serde(default)]
+    pub grounded: usize,
+    /// Why the engine gave the kick up.
+    #[serde(default)]
+    pub broken_off: Option<BreakOff>,
 }
 
 /// All results of a cell.
@@ -81,6 +101,10 @@ pub struct CellResult {
 struct Timed<'a> {
     engine: &'a mut dyn KickEngine,
     times: &'a mut Vec<f32>,
+    /// First and last time at which the foot was to swing, s.
+    swing: [f64; 2],
+    /// The last forecast before the contact.
+    forecast: Option<f64>,
 }
 
 impl Controller for Timed<'_> {
@@ -88,6 +112,13 @@ impl Controller for Timed<'_> {
         let start = thread_seconds();
         self.engine.tick(sensors, command);
         self.times.push((thread_seconds() - start) as f32);
+        let progress = self.engine.progress();
+        if matches!(progress.phase, Phase::WindUp | Phase::Kick) {
+            self.swing = [self.swing[0].min(sensors.time), sensors.time];
+        }
+        if progress.to_contact.is_some_and(|left| left > 0.0) {
+            self.forecast = self.engine.forecast();
+        }
     }
 }
 
@@ -196,9 +227,14 @@ pub fn run_case(
         ball,
         direction: case.request.direction,
     };
-    let mut timed = Timed { engine, times: ticks };
+    let forecast = engine.forecast();
+    let mut timed = Timed { engine, times: ticks, swing: [f64::INFINITY, f64::NEG_INFINITY], forecast };
     let trial = run_disturbed(world, &settings, &disturbances, &mut timed)?;
-    let kicked = judge(subject, case, &trial);
+    let mut kicked = judge(subject, case, &trial);
+    kicked.forecast = timed.forecast;
+    kicked.grounded = grounded(robot, &trial, plan.foot, timed.swing);
+    kicked.broken_off = engine.broken_off();
+    kicked.precision = plan.precision;
     Ok((Ok(kicked), plan_time, Some(Ran { plan, settings, trial })))
 }
 
@@ -220,5 +256,23 @@ fn judge(subject: &Subject, case: &Case, trial: &Trial) -> Kicked {
         contact: impact.map(|impact| impact.time),
         audit_invalid: invalid,
         violations: trial.limit_violations.len(),
+        turn: case.turn,
+        turn_error: trial.direction_error.filter(|_| hit).map(|error| -case.side * error),
+        forecast: None,
+        precision: 0.0,
+        grounded: 0,
+        broken_off: None,
     }
+}
+
+/// Samples between two times at which a foot touched the ground.
+fn grounded(robot: &Robot, trial: &Trial, foot: Side, [from, to]: [f64; 2]) -> usize {
+    let upright = trial.fell_at.unwrap_or(f64::INFINITY);
+    let record = &trial.record;
+    let during = |i: &usize| (from..=to.min(upright)).contains(&record.times[*i]);
+    let touches = |i: &usize| {
+        let forces = record.row(&record.contact_forces, *i);
+        robot.contacts.iter().enumerate().any(|(c, contact)| contact.leg == foot && forces[3 * c + 2] > 0.0)
+    };
+    (0..record.len()).filter(during).filter(touches).count()
 }

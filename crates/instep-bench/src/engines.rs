@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use instep_kick::adaptive::{AdaptiveKick, AdaptiveSettings, Stabiliser, load_grid};
 use instep_kick::dynamic::{DynamicKick, DynamicSettings};
 use instep_kick::preview::{PreviewKick, PreviewSettings};
 use instep_kick::{BallModel, KickEngine};
@@ -39,10 +40,27 @@ const ENTRIES: &[Entry] = &[
         file: "preview-tuned.toml",
         make: |subject, text| subject.preview("preview-tuned.toml", text),
     },
+    Entry { name: "adaptive", file: "adaptive.toml", make: |subject, text| subject.adaptive(text, |_| ()) },
+    Entry {
+        name: "adaptive-once",
+        file: "adaptive.toml",
+        make: |subject, text| subject.adaptive(text, |settings| settings.feedback.follow_ball = false),
+    },
+    Entry {
+        name: "adaptive-sphere",
+        file: "adaptive.toml",
+        make: |subject, text| subject.adaptive(text, |settings| settings.kick.true_shape = false),
+    },
+    Entry {
+        name: "adaptive-inclination",
+        file: "adaptive.toml",
+        make: |subject, text| subject.adaptive(text, |settings| settings.stabiliser = Stabiliser::Inclination),
+    },
 ];
 
-/// Names of the engines; `dynamic-open` is `dynamic` with its closed loop off, `…-tuned` an engine with the settings that
-/// `instep tune` found.
+/// Names of the engines. `dynamic-open` is `dynamic` with its closed loop off, `…-tuned` an engine with the settings that
+/// `instep tune` found. `adaptive-once` plans the retraction once, `adaptive-sphere` takes the foot for a sphere,
+/// `adaptive-inclination` has the paper's stabiliser.
 pub fn engines() -> impl Iterator<Item = &'static str> {
     ENTRIES.iter().map(|entry| entry.name)
 }
@@ -172,6 +190,14 @@ impl Subject {
     fn preview(&self, file: &str, text: &str) -> Made {
         let settings = PreviewSettings::parse(&self.folder.join(file).display().to_string(), text)?;
         Ok(Box::new(PreviewKick::new(Arc::clone(&self.robot), self.ball, settings)?))
+    }
+
+    fn adaptive(&self, text: &str, change: fn(&mut AdaptiveSettings)) -> Made {
+        let file = self.folder.join("adaptive.toml").display().to_string();
+        let mut settings = AdaptiveSettings::parse(&file, text)?;
+        change(&mut settings);
+        let grid = Arc::new(load_grid(&self.folder)?);
+        Ok(Box::new(AdaptiveKick::new(Arc::clone(&self.robot), self.ball, settings, grid)?))
     }
 }
 

@@ -3,7 +3,9 @@
 //! - [`scenario`]: data files that say where balls lie, which kicks are asked, and what the world does meanwhile.
 //! - [`engines`]: which engines there are, and what a robot brings to its trials.
 //! - [`cell`]: one engine, robot, scenario and seed, run and measured.
+//! - [`reach`]: the reachability grid of the adaptive kick, measured in the world.
 //! - [`run`]: all cells on all cores, with a file to resume from.
+//! - [`directions`]: how far the ball goes off the asked direction, and whether the engine knew.
 //! - [`table`] and [`page`]: Markdown, CSV, JSON and HTML.
 //!
 //! One world a thread; but for the times that plans and ticks take the same cells give the same results on any number of threads. Engines see
@@ -11,9 +13,11 @@
 
 pub mod cell;
 pub mod cpu;
+pub mod directions;
 pub mod engines;
 mod error;
 pub mod page;
+pub mod reach;
 pub mod run;
 pub mod scenario;
 pub mod table;

@@ -62,6 +62,9 @@ pub struct Kick {
     pub direction_deg: Range,
     /// Speed of the ball as it leaves, m/s.
     pub speed: Range,
+    /// Directions are not drawn but taken in turn: this many, evenly from the least to the greatest.
+    #[serde(default)]
+    pub sweep: Option<usize>,
 }
 
 /// The ground; ranges of the fields of `instep_sim::settings::Pitch`.
@@ -106,6 +109,9 @@ pub struct DisturbanceRange {
     pub rolling: Option<Range>,
     /// Where it comes from, degrees from the kick's direction reversed; 0 comes straight at the foot.
     pub rolling_from_deg: Option<Range>,
+    /// Seconds from the start after which a rolling ball is at its place with that speed; 1.5 when absent, about a kick's
+    /// preparation.
+    pub rolling_time: Option<f64>,
 }
 
 /// What a scenario needs to know of a robot.
@@ -140,11 +146,15 @@ pub struct Case {
     pub push: Option<(f64, f64, [f64; 2])>,
     /// The ball is moved: seconds before contact, by how much, m.
     pub ball_moved: Option<(f64, [f64; 2])>,
+    /// The direction as the scenario says it, rad: positive toward the middle line, as seen from the ball's side.
+    pub turn: f64,
+    /// +1 for a ball on the left, -1 for one on the right.
+    pub side: f64,
     /// Seed of the trial's noise.
     pub seed: u64,
 }
 
-/// Seconds of rolling that a moving ball's place is drawn for: about a kick's preparation.
+/// Seconds of rolling that a moving ball's place is drawn for where the scenario says nothing.
 const ROLL_TIME: f64 = 1.5;
 
 impl Scenario {
@@ -197,6 +207,21 @@ impl Scenario {
             ("disturbance.rolling", d.rolling),
             ("disturbance.rolling_from_deg", d.rolling_from_deg),
         ];
+        let whole = self.kick.sweep.is_none_or(|count| (2..=1000).contains(&count));
+        let time = d.rolling_time.unwrap_or(ROLL_TIME);
+        for (field, found, good, expected) in [
+            ("kick.sweep", self.kick.sweep.unwrap_or(0) as f64, whole, "a number of directions from 2 to 1000"),
+            ("disturbance.rolling_time", time, (0.0..=20.0).contains(&time), "a number in [0, 20] s"),
+        ] {
+            if !good {
+                return Err(BenchError::Field {
+                    file: file.to_owned(),
+                    field: field.to_owned(),
+                    found: found.to_string(),
+                    expected: expected.into(),
+                });
+            }
+        }
         for (field, range) in ranges {
             if let Some([low, high]) = range
                 && !(low.is_finite() && high.is_finite() && low <= high)
@@ -222,10 +247,10 @@ impl Scenario {
     #[must_use]
     pub fn cases(&self, size: &Size, seed: u64, count: usize) -> Vec<Case> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        (0..count).map(|_| self.case(size, &mut rng)).collect()
+        (0..count).map(|i| self.case(size, i, &mut rng)).collect()
     }
 
-    fn case(&self, size: &Size, rng: &mut ChaCha8Rng) -> Case {
+    fn case(&self, size: &Size, index: usize, rng: &mut ChaCha8Rng) -> Case {
         let mut draw = |[low, high]: Range| {
             let share: f64 = rng.random();
             low + (high - low) * share
@@ -234,7 +259,12 @@ impl Scenario {
         let gap = draw(self.ball.gap) * size.leg;
         let lateral = draw(self.ball.lateral) * size.half_width;
         let target = [size.toes + gap + size.ball, side * lateral];
-        let direction = -side * draw(self.kick.direction_deg).to_radians();
+        let drawn = draw(self.kick.direction_deg);
+        let asked = self.kick.sweep.map_or(drawn, |count| {
+            let [low, high] = self.kick.direction_deg;
+            low + (high - low) * (index % count) as f64 / count.saturating_sub(1).max(1) as f64
+        });
+        let direction = -side * asked.to_radians();
         let speed = draw(self.kick.speed);
         let d = &self.disturbance;
         let turn = std::f64::consts::TAU;
@@ -265,8 +295,9 @@ impl Scenario {
 
         // A rolling ball starts where it will pass the drawn place when the foot is ready.
         let heading = direction + std::f64::consts::PI + from;
-        let start_speed = rolling + size.deceleration * ROLL_TIME * f64::from(u8::from(rolling > 0.0));
-        let way = (start_speed - 0.5 * size.deceleration * ROLL_TIME) * ROLL_TIME * f64::from(u8::from(rolling > 0.0));
+        let time = if rolling > 0.0 { d.rolling_time.unwrap_or(ROLL_TIME) } else { 0.0 };
+        let start_speed = rolling + size.deceleration * time;
+        let way = (start_speed - 0.5 * size.deceleration * time) * time;
         let ball = [target[0] - way * heading.cos(), target[1] - way * heading.sin()];
         let ball_velocity = [start_speed * heading.cos(), start_speed * heading.sin()];
         let request = KickRequest {
@@ -288,6 +319,8 @@ impl Scenario {
             model,
             push: d.push.map(|_| (push_before, d.push_duration.unwrap_or(0.05), polar(push, push_angle))),
             ball_moved: d.ball_moved.map(|_| (moved_before, polar(moved * size.leg, moved_angle))),
+            turn: asked.to_radians(),
+            side,
             seed: rng.random(),
         }
     }

@@ -6,9 +6,21 @@
 
 use instep_motion::phase::Side;
 use instep_robot::control::{Controller, Sensors};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::request::{KickRequest, Refusal};
+
+/// Why an engine gave a kick up that it had begun.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum BreakOff {
+    /// The ball went where no foot can meet it.
+    BallGone,
+    /// The foot could not be brought to strike in the wanted direction.
+    Unaimed,
+    /// The ball did not come in time.
+    Late,
+}
 
 /// Where in a kick an engine is (paper 2, section 3.1, with the shift of weight before and after).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -123,4 +135,15 @@ pub trait KickEngine: Controller {
 
     /// How far it is.
     fn progress(&self) -> Progress;
+
+    /// The present forecast of the direction: cosine of the angle between the foot's way and the wanted direction
+    /// (paper 3, equation 1). `None` for engines that have none. A caller may break off when it is too poor.
+    fn forecast(&self) -> Option<f64> {
+        None
+    }
+
+    /// Why the engine itself gave the last kick up; `None` when it did not.
+    fn broken_off(&self) -> Option<BreakOff> {
+        None
+    }
 }

@@ -53,4 +53,17 @@ pub enum KickError {
         /// What would be right.
         expected: String,
     },
+    /// A reachability grid of another robot, or of an older model or stance of this one.
+    #[error(
+        "the reachability grid was measured with another robot, or an older model or stance of \"{robot}\" (hash {found:016x}, \
+         not {expected:016x}): measure it again with `instep robot reach {robot}`"
+    )]
+    OtherGrid {
+        /// The robot at hand.
+        robot: String,
+        /// Hash that the grid was measured with.
+        found: u64,
+        /// Hash of the robot at hand.
+        expected: u64,
+    },
 }

@@ -219,6 +219,12 @@ impl Ik {
         Ok(ik)
     }
 
+    /// The same solver with other weights.
+    #[must_use]
+    pub fn with_weights(self, weights: Weights) -> Self {
+        Self { weights, ..self }
+    }
+
     /// The joints that it moves.
     pub fn joints(&self) -> impl Iterator<Item = usize> {
         self.unknowns.iter().flatten().flatten().copied()

@@ -3,6 +3,7 @@
 //! - [`request`]: what is asked, and the causes of a refusal; [`dialect`]: the request formats that teams already send.
 //! - [`ball`]: the ball that a robot plays.
 //! - [`engine`]: the trait that every engine implements.
+//! - [`adaptive`]: paper 3's engine: retraction and strike in a measured reachability grid, following the ball.
 //! - [`dynamic`]: paper 2's engine: splines of foot and trunk in the support foot's frame, stabilised by the centre of
 //!   pressure.
 //! - [`whole_body`]: what such engines share: the robot's feet, curves, feed-forward torques, closed loop.
@@ -13,6 +14,7 @@
 //!
 //! An engine sees sensors, never the simulator's truth, and allocates nothing in a tick.
 
+pub mod adaptive;
 pub mod ball;
 pub mod dialect;
 pub mod dynamic;
@@ -29,7 +31,7 @@ pub mod tree;
 pub mod whole_body;
 
 pub use ball::BallModel;
-pub use engine::{Face, KickEngine, KickPlan, KickStatus, Phase, Progress};
+pub use engine::{BreakOff, Face, KickEngine, KickPlan, KickStatus, Phase, Progress};
 pub use error::KickError;
 pub use playback::Playback;
 pub use request::{KickRequest, Place, Refusal, Strength};

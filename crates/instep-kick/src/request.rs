@@ -158,6 +158,14 @@ pub enum Refusal {
         /// Smallest gap, m; negative is an overlap.
         gap: f64,
     },
+    /// On the way the kicking foot would come too near to the ground.
+    #[error("the {foot} foot comes within {gap:.3} m of the ground")]
+    HitsGround {
+        /// The foot.
+        foot: Side,
+        /// Height of its lowest point, m.
+        gap: f64,
+    },
     /// The motors cannot do it.
     #[error("{asked:.2} m/s at the {foot} foot asks {share:.2} times what joint {joint} can do")]
     TooFast {
@@ -214,6 +222,15 @@ pub enum Refusal {
         /// What the engine's settings state for this kind of kick, rad.
         possible: f64,
     },
+    /// Within the measured grid of reachable places no part of a foot can be brought behind the ball, or none so that it
+    /// moves in the wanted direction.
+    #[error("the ball is outside what a foot can reach for that direction{}", nearest_text(.nearest))]
+    OutsideGrid {
+        /// The foot that was asked for.
+        foot: Option<Side>,
+        /// The nearest request that can be kicked: ball, m, and direction, rad.
+        nearest: Option<([f64; 2], f64)>,
+    },
     /// A kick is under way.
     #[error("a kick is under way; cancel it first")]
     Busy,
@@ -258,16 +275,27 @@ impl Refusal {
             Self::TooFar { .. } => "too_far",
             Self::Unreachable { .. } => "unreachable",
             Self::SelfCollision { .. } => "self_collision",
+            Self::HitsGround { .. } => "hits_ground",
             Self::TooFast { .. } => "too_fast",
             Self::TooStrong { .. } => "too_strong",
             Self::TooHeavy { .. } => "too_heavy",
             Self::OffBalance { .. } => "off_balance",
             Self::TooLate { .. } => "too_late",
             Self::TooImprecise { .. } => "too_imprecise",
+            Self::OutsideGrid { .. } => "outside_grid",
             Self::Busy => "busy",
             Self::NotStanding { .. } => "not_standing",
         }
     }
+}
+
+fn nearest_text(nearest: &Option<([f64; 2], f64)>) -> String {
+    nearest.map_or_else(
+        || "; walk to it first".to_owned(),
+        |([x, y], direction)| {
+            format!("; the nearest that can be kicked: ball ({x:.2}, {y:.2}) m, {:.0} degrees", direction.to_degrees())
+        },
+    )
 }
 
 /// A place of the swing.

@@ -572,6 +572,8 @@ fn is_reach(refusal: &Refusal) -> bool {
         | Refusal::TooFast { .. }
         | Refusal::TooStrong { .. }
         | Refusal::TooHeavy { .. }
+        | Refusal::HitsGround { .. }
+        | Refusal::OutsideGrid { .. }
         | Refusal::OffBalance { .. } => true,
         Refusal::NotFinite { .. }
         | Refusal::NoStrength { .. }

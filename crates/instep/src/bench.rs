@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
+use instep_bench::directions::directions;
 use instep_bench::table::{csv, json, markdown, rows};
 use instep_bench::{Bench as KickBench, BenchError, Scenario, Subject, engines, page, table::rows_over_seeds};
 
@@ -88,7 +89,9 @@ impl Bench {
             bench.requests,
             bench.seeds.len()
         );
-        let object = json(&each);
+        let sweeps = directions(&cells);
+        let mut object = json(&each);
+        object["directions"] = serde_json::to_value(&sweeps).map_err(Failure::other)?;
         let mut batch = files::Batch::default();
         let [md, comma, js, html] = &names;
         let write = |path: PathBuf, text: &str| {
@@ -98,7 +101,7 @@ impl Bench {
         write(batch.stage(md)?.to_owned(), &text)?;
         write(batch.stage(comma)?.to_owned(), &csv(&each))?;
         write(batch.stage(js)?.to_owned(), &object.to_string())?;
-        page::page(&all, vec![note]).save(batch.stage(html)?)?;
+        page::page(&all, &sweeps, vec![note]).save(batch.stage(html)?)?;
         batch.commit()?;
         output.show(&object, |_| text)?;
         Ok(ExitCode::SUCCESS)

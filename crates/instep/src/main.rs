@@ -16,6 +16,7 @@ mod learn_table;
 mod mujoco_log;
 mod output;
 mod places;
+mod reach;
 mod retarget;
 mod robot;
 mod ros;

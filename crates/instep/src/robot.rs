@@ -8,7 +8,7 @@ use instep_robot::check::{self, CheckReport, Finding, Kind};
 
 use crate::failure::Failure;
 use crate::output::{Output, Paint};
-use crate::places;
+use crate::{places, reach};
 
 /// The subcommands of `instep robot`.
 #[derive(Debug, Subcommand)]
@@ -18,6 +18,8 @@ pub(crate) enum RobotCommand {
         /// A robot's folder, its robot.toml, or a bare model (MJCF or URDF)
         path: PathBuf,
     },
+    /// Measure which places the kicking foot can reach, by moving the simulated robot through them
+    Reach(reach::Reach),
 }
 
 impl RobotCommand {
@@ -26,7 +28,10 @@ impl RobotCommand {
     /// # Errors
     /// When the files cannot be read, or are not what they should be.
     pub(crate) fn run(self, output: &Output) -> Result<ExitCode, Failure> {
-        let Self::Check { path } = self;
+        let path = match self {
+            Self::Check { path } => path,
+            Self::Reach(reach) => return reach.run(output),
+        };
         let path = places::robot_files(&path)?;
         let report = check::check(&path)?;
         output.show(&report, |paint| text(&report, paint))?;

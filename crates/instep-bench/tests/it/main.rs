@@ -1,13 +1,15 @@
 //! The benchmark itself: scenarios load, cells are the same on any number of threads, a stopped run goes on.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
+mod adaptive;
+
 use std::path::{Path, PathBuf};
 
 use instep_bench::cell::CellResult;
 use instep_bench::table::{csv, json, markdown, quantile, rows, rows_over_seeds};
 use instep_bench::{Bench, BenchError, Scenario, Subject};
 
-fn root(folder: &str) -> PathBuf {
+pub(crate) fn root(folder: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(folder)
 }
 
@@ -92,7 +94,7 @@ fn cells_are_the_same_on_one_thread_and_on_two_and_after_a_stop() {
     }
     assert_eq!(markdown(&each).lines().count(), 6);
     assert_eq!(csv(&each).lines().count(), 5);
-    instep_bench::page::page(&each, vec![]).check().unwrap();
+    instep_bench::page::page(&each, &[], vec![]).check().unwrap();
 }
 
 #[test]

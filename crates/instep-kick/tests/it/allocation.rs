@@ -4,11 +4,13 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::sync::Arc;
 
+use instep_kick::adaptive::AdaptiveKick;
+use instep_kick::dynamic::DynamicKick;
 use instep_kick::policy::PolicyKick;
 use instep_kick::preview::{Com, PreviewKick, PreviewSettings, Stabiliser};
-use instep_kick::{BallModel, KickEngine, KickRequest, Playback};
+use instep_kick::{BallModel, BreakOff, KickEngine, KickRequest, Playback};
 use instep_robot::Robot;
-use instep_robot::control::{Controller, JointCommand};
+use instep_robot::control::{BallObservation, Controller, JointCommand};
 
 use crate::policy::{policy, prestoe};
 use crate::rig::{engine, request, robot, standing};
@@ -75,6 +77,37 @@ fn a_tick_of_preview_allocates_nothing() {
             let mut engine = PreviewKick::new(Arc::clone(&robot), ball, settings).unwrap();
             assert_eq!(allocated(&mut engine, &robot, &request("nao"), cancel), 0, "{com:?} allocated in a tick");
         }
+    }
+}
+
+/// The ball is seen, moves twice while the foot goes back, and at last goes where no foot can meet it.
+#[test]
+fn the_adaptive_kick_allocates_nothing_while_it_follows_the_ball() {
+    for name in ["nao", "wolfgang"] {
+        let robot = robot(name);
+        let mut engine = AdaptiveKick::load(robot.clone()).unwrap();
+        let mut sensors = standing(&robot);
+        let mut command = JointCommand::zeros(robot.joints.len());
+        let request = request(name);
+        let foot = DynamicKick::load(robot.clone()).unwrap().footprint_from_base();
+        let plan = engine.plan(&request, &sensors).unwrap();
+        let mut broke = None;
+        let before = COUNT.get();
+        while sensors.time < plan.duration + 1.0 {
+            let by = match sensors.time / plan.contact {
+                t if t < 0.7 => [0.0, 0.0],
+                t if t < 0.75 => [0.015, 0.01],
+                t if t < 0.8 => [-0.005, -0.02],
+                _ => [0.5, 0.5],
+            };
+            let at = [request.ball[0] + by[0] - foot[0], request.ball[1] + by[1] - foot[1], 0.05];
+            sensors.ball = Some(BallObservation { time: sensors.time, position: at });
+            engine.tick(&sensors, &mut command);
+            broke = broke.or(engine.broken_off());
+            sensors.time += engine.control_period();
+        }
+        assert_eq!(COUNT.get(), before, "{name} allocated in a tick");
+        assert_eq!(broke, Some(BreakOff::BallGone), "{name}");
     }
 }
 

@@ -81,6 +81,8 @@ pub(super) fn run(
             model: ModelError::default(),
             push: None,
             ball_moved: None,
+            turn: request.direction,
+            side: 1.0,
             seed,
         };
         let (outcome, plan_s, ran) = run_case(subject, &case, planner.as_mut(), &mut world, &mut Vec::new())?;

@@ -1,0 +1,558 @@
+//! From a request to a motion, or the cause why not.
+//!
+//! The grid proposes strokes with every part of both feet (`lookup`); inverse kinematics checks them with the foot's
+//! rotation, which the grid does not hold; the best is followed along its whole way with joint speeds, torques and the centre of
+//! pressure, and slowed down until all are within limits ("at the joints' limits"): the plan says what speed comes.
+//! Where no stroke is in the grid, the nearest request that can be kicked is named.
+
+use instep_motion::phase::Side;
+use nalgebra::{Rotation3, Vector2, Vector3};
+
+use crate::adaptive::geometry::wrap;
+use crate::adaptive::grid::Grid;
+use crate::adaptive::lookup::{Found, Query, look_up_all};
+use crate::adaptive::motion::{Motion, Stroke, goals, trunk_support};
+use crate::adaptive::settings::AdaptiveSettings;
+use crate::engine::{Face, KickPlan, Phase};
+use crate::ik::{Ik, Residual};
+use crate::request::{KickRequest, Place, Refusal, Strength};
+use crate::tree::TreePose;
+use crate::whole_body::body::Body;
+use crate::whole_body::torque::Dynamics;
+
+/// Steps of inverse kinematics to a far place, to a near one, and along a way that is sampled densely.
+const FAR: usize = 12;
+const MIDDLE: usize = 6;
+const WAY: usize = 2;
+/// Strokes whose whole way is forecast.
+const FORECASTS: usize = 14;
+/// Cost of slowing a stroke down by its whole speed, or its retraction by its whole time.
+const SLOW_COST: f64 = 0.5;
+/// Time constant with which the planned centre of pressure is smoothed before it is held against the foot, s.
+const TIPPING: f64 = 0.04;
+/// Sampling of the forecast, s: in the strike, and elsewhere.
+const FINE: f64 = 0.016;
+const COARSE: f64 = 0.03;
+/// Share of the joints' speeds that retraction and way back may take: there is time, and a leg that swings freely overshoots.
+const CALM: f64 = 0.8;
+/// Least height of any point of the swing foot over the ground, m.
+const GROUND: f64 = 0.006;
+/// What the strike's speed is multiplied with until it is within limits.
+const SLOWER: f64 = 0.85;
+/// What retraction and way back are slowed down with until the joints can, and how much at most.
+const PACE: f64 = 1.4;
+const SLOWEST: f64 = 3.0;
+/// Waits for a rolling ball that are tried, s.
+const WAIT_STEP: f64 = 0.08;
+/// Times of contact with a rolling ball that are compared.
+const GOOD_TIMES: usize = 2;
+/// How much later than the ball the foot may be, s.
+const ON_TIME: f64 = 0.02;
+/// Grid steps of a search for the nearest reachable request: ball, m, and direction, rad.
+const NEAREST_BALL: f64 = 0.02;
+const NEAREST_DIRECTION: f64 = 0.175;
+/// Whole plans that such a search may take.
+const NEAREST_PLANS: usize = 8;
+
+/// A motion that was forecast to be possible.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Planned {
+    pub(crate) motion: Motion,
+    pub(crate) stroke: Stroke,
+    pub(crate) plan: KickPlan,
+}
+
+/// Scratch space of the planner.
+#[derive(Debug)]
+pub(crate) struct Planner {
+    ik: Ik,
+    pose: TreePose,
+    angles: Vec<f64>,
+    saved: Vec<f64>,
+    /// Joint angles with the left or right foot lifted over its place.
+    lifted: [Vec<f64>; 2],
+    dynamics: Dynamics,
+    found: Vec<Found>,
+}
+
+/// Distance that a residual counts as, m: 1 rad is 0.1 m.
+fn miss(residual: &Residual) -> f64 {
+    residual.position + 0.1 * residual.orientation + 0.5 * residual.balance
+}
+
+/// The push that a ball (moving with `velocity`, m/s) needs to leave toward `direction` (rad) at `speed` (m/s).
+pub(crate) fn push(direction: f64, speed: f64, velocity: Vector2<f64>) -> Vector2<f64> {
+    Vector2::new(direction.cos(), direction.sin()) * speed - velocity
+}
+
+impl Planner {
+    pub(crate) fn new(body: &Body, settings: &AdaptiveSettings, ik: Ik, dynamics: Dynamics) -> Self {
+        let mut planner = Self {
+            ik,
+            pose: body.tree.pose(),
+            angles: body.angles.clone(),
+            saved: body.angles.clone(),
+            lifted: [body.angles.clone(), body.angles.clone()],
+            dynamics,
+            found: Vec::new(),
+        };
+        for swing in [Side::Left, Side::Right] {
+            planner.angles.copy_from_slice(&body.angles);
+            body.set_arms(1.0, &mut planner.angles);
+            let home = body.stand(swing).home;
+            let goals =
+                goals(&[home.x, home.y, settings.kick.lift, 0.0, 0.0], &trunk_support(body, settings, swing, 0.0));
+            planner.ik.solve(&body.tree, &mut planner.pose, &mut planner.angles, swing, &goals, 30);
+            planner.lifted[swing as usize].copy_from_slice(&planner.angles);
+        }
+        planner
+    }
+
+    /// Plans `request`.
+    pub(crate) fn plan(
+        &mut self,
+        body: &Body,
+        settings: &AdaptiveSettings,
+        grid: &Grid,
+        request: &KickRequest,
+    ) -> Result<Planned, Refusal> {
+        request.check()?;
+        let planned = match self.plan_moving(body, settings, grid, request) {
+            Err(Refusal::OutsideGrid { foot, .. }) => {
+                let nearest = self.nearest(body, settings, grid, request);
+                return Err(Refusal::OutsideGrid { foot, nearest });
+            }
+            other => other?,
+        };
+        if let Some(deadline) = request.deadline
+            && planned.plan.contact > deadline
+        {
+            return Err(Refusal::TooLate { contact: planned.plan.contact, deadline });
+        }
+        if let Some(asked) = request.precision
+            && planned.plan.precision > asked
+        {
+            return Err(Refusal::TooImprecise { asked, possible: planned.plan.precision });
+        }
+        Ok(planned)
+    }
+
+    /// The ball where it will be at the contact; a ball that still has to come is waited for.
+    fn plan_moving(
+        &mut self,
+        body: &Body,
+        settings: &AdaptiveSettings,
+        grid: &Grid,
+        request: &KickRequest,
+    ) -> Result<Planned, Refusal> {
+        if Vector2::from(request.ball_velocity).norm() < 0.02 {
+            return Ok(self.plan_at(body, settings, grid, request, (request.ball, [0.0; 2]), 0.0)?.0);
+        }
+        let t = &settings.times;
+        let soonest = t.shift + t.settle + 2.0 * t.foot_least + t.aim + 0.3;
+        let mut best: Option<(Planned, f64)> = None;
+        let mut refusal = None;
+        let mut good = 0;
+        for i in 0..=(t.wait / WAIT_STEP) as usize {
+            let at = soonest + i as f64 * WAIT_STEP;
+            let ball = body.ball.roll(request.ball, request.ball_velocity, at);
+            match self.plan_at(body, settings, grid, request, ball, at) {
+                // A foot that comes later than the ball misses it.
+                Ok((planned, _)) if planned.plan.contact > at + ON_TIME => {}
+                Ok((planned, cost)) => {
+                    good += 1;
+                    if best.is_none_or(|(_, least)| cost < least) {
+                        best = Some((planned, cost));
+                    }
+                }
+                Err(cause) => refusal = refusal.or(Some(cause)),
+            }
+            if good >= GOOD_TIMES {
+                break;
+            }
+        }
+        best.map(|(planned, _)| planned)
+            .ok_or_else(|| refusal.unwrap_or(Refusal::OutsideGrid { foot: request.foot, nearest: None }))
+    }
+
+    /// Plans for a ball that is at a place (m) with a velocity (m/s) at the contact, which is to be at `at` (s; 0: as
+    /// soon as can be).
+    fn plan_at(
+        &mut self,
+        body: &Body,
+        settings: &AdaptiveSettings,
+        grid: &Grid,
+        request: &KickRequest,
+        (ball, velocity): ([f64; 2], [f64; 2]),
+        at: f64,
+    ) -> Result<(Planned, f64), Refusal> {
+        let mut found = std::mem::take(&mut self.found);
+        found.clear();
+        let wanted = match request.strength {
+            Strength::BallSpeed(v) => v,
+            Strength::FootSpeed(v) => v * body.ball.gain(1.0),
+            Strength::Distance(d) => (2.0 * body.ball.deceleration * d).sqrt(),
+        };
+        let aim = push(request.direction, wanted, velocity.into());
+        for swing in [Side::Left, Side::Right] {
+            if request.foot.is_some_and(|foot| foot != swing) {
+                continue;
+            }
+            let query = Query {
+                swing,
+                ball: body.support_from_footprint(swing, ball).into(),
+                direction: aim.y.atan2(aim.x),
+                speed: 1.0,
+                follow: settings.kick.follow,
+                retraction: settings.kick.retraction[1],
+            };
+            look_up_all(body, settings, grid, &query, &mut found);
+        }
+        found.sort_by(|a, b| a.1.total_cmp(&b.1));
+        let mut refusal = None;
+        let mut forecasts = 0;
+        // Of several times of contact each gets fewer.
+        let most = if at > 0.0 { FORECASTS / 4 } else { FORECASTS };
+        let mut best: Option<(Planned, f64)> = None;
+        for (stroke, cost) in &found {
+            // Nothing that follows can be better than what is known.
+            if best.is_some_and(|(_, least)| least <= *cost) || forecasts >= most {
+                break;
+            }
+            let mut stroke = Stroke { at, ..*stroke };
+            if stroke.forecast < settings.kick.forecast_least {
+                continue;
+            }
+            let tried = self.screen(body, settings, &mut stroke, (request, velocity)).and_then(|needed| {
+                forecasts += 1;
+                let motion = self.fastest(body, settings, &mut stroke, needed)?;
+                Ok((motion, needed))
+            });
+            match tried {
+                Ok((motion, needed)) => {
+                    let plan = self.tell(settings, request, velocity.into(), &stroke, &motion, needed);
+                    // A stroke that had to be slowed down is near the limits of the joints.
+                    let cost = cost + SLOW_COST * (stroke.pace - 1.0 + 1.0 - stroke.speed / needed.0);
+                    if best.is_none_or(|(_, least)| cost < least) {
+                        best = Some((Planned { motion, stroke, plan }, cost));
+                    }
+                }
+                Err(cause) => refusal = Some(graver(refusal, cause)),
+            }
+        }
+        self.found = found;
+        best.ok_or_else(|| refusal.unwrap_or(Refusal::OutsideGrid { foot: request.foot, nearest: None }))
+    }
+
+    /// What the caller is told.
+    fn tell(
+        &self,
+        settings: &AdaptiveSettings,
+        request: &KickRequest,
+        velocity: Vector2<f64>,
+        stroke: &Stroke,
+        motion: &Motion,
+        (foot_speed, ball_speed): (f64, f64),
+    ) -> KickPlan {
+        // The push grows with the foot's speed relative to the ball; the ball keeps its own velocity.
+        let along = velocity.dot(&Vector2::new(stroke.normal.cos(), stroke.normal.sin()));
+        let share = (stroke.speed - along) / (foot_speed - along).max(1e-6);
+        let whole = push(request.direction, ball_speed, velocity);
+        let comes = velocity + whole * share.clamp(0.0, 1.0);
+        KickPlan {
+            foot: stroke.swing,
+            face: stroke.face,
+            contact: motion.contact.unwrap_or(0.0),
+            duration: motion.end(),
+            foot_speed: stroke.speed,
+            ball_speed: comes.norm(),
+            precision: precision(settings, stroke),
+        }
+    }
+
+    /// Checks a stroke's places with the foot's rotation and sets how far it follows through; gives the foot speed that the request
+    /// needs and the ball speed that it gives, m/s.
+    fn screen(
+        &mut self,
+        body: &Body,
+        settings: &AdaptiveSettings,
+        stroke: &mut Stroke,
+        (request, velocity): (&KickRequest, [f64; 2]),
+    ) -> Result<(f64, f64), Refusal> {
+        self.angles.copy_from_slice(&self.lifted[stroke.swing as usize]);
+        self.reach(body, settings, stroke, &stroke.contact, Place::Contact, FAR)?;
+        self.saved.copy_from_slice(&self.angles);
+        self.dynamics.fill(body, stroke.swing.other(), &self.angles, &self.pose);
+        let toward = Vector3::new(stroke.normal.cos(), stroke.normal.sin(), 0.0);
+        let foot = &body.feet[stroke.swing as usize];
+        let point = stroke.part.meet(foot, stroke.normal, f64::INFINITY).map_or(foot.faces[0], |(_, point)| point);
+        let strike = stroke.contact + Rotation3::from_axis_angle(&Vector3::z_axis(), stroke.yaw) * point.axis;
+        let mass = self.dynamics.effective_mass(body.robot.leg(stroke.swing).foot, &strike, &toward);
+        let ball_speed = match request.strength {
+            Strength::BallSpeed(v) => v,
+            Strength::FootSpeed(v) => v * body.ball.gain(mass),
+            Strength::Distance(d) => (2.0 * body.ball.deceleration * d).sqrt(),
+        };
+        let change = push(request.direction, ball_speed, velocity.into()).norm();
+        let along = Vector2::from(velocity).dot(&toward.xy());
+        // Only the part of the foot's speed along the push drives the ball.
+        let share = stroke.direction().dot(&toward).max(0.3);
+        let foot_speed = ((change / body.ball.gain(mass) * settings.kick.speed_gain + along) / share).max(0.1);
+        stroke.speed = foot_speed;
+        self.reach(body, settings, stroke, &stroke.retraction, Place::WindUp, MIDDLE)?;
+        let mut failure = None;
+        let most = stroke.follow;
+        for share in [1.0, 0.6, 0.3] {
+            stroke.follow = share * most;
+            self.angles.copy_from_slice(&self.saved);
+            match self.reach(body, settings, stroke, &stroke.rest(), Place::FollowThrough, MIDDLE) {
+                Ok(()) => return Ok((foot_speed, ball_speed)),
+                Err(cause) => failure = Some(cause),
+            }
+        }
+        failure.map_or(Ok((foot_speed, ball_speed)), Err)
+    }
+
+    /// The fastest motion within limits, at most the needed one.
+    fn fastest(
+        &mut self,
+        body: &Body,
+        settings: &AdaptiveSettings,
+        stroke: &mut Stroke,
+        (needed, _): (f64, f64),
+    ) -> Result<Motion, Refusal> {
+        loop {
+            let motion = Motion::kick(body, settings, stroke);
+            match self.forecast(body, settings, &motion, stroke) {
+                Ok(()) => return Ok(motion),
+                Err((cause, false)) => {
+                    if stroke.pace * PACE > SLOWEST || !matches!(cause, Refusal::TooFast { .. }) {
+                        return Err(cause);
+                    }
+                    stroke.pace *= PACE;
+                }
+                Err((cause, true)) => {
+                    let slower = matches!(cause, Refusal::TooFast { .. } | Refusal::OffBalance { .. });
+                    if !slower || stroke.speed * SLOWER < settings.kick.speed_least * needed {
+                        return Err(cause);
+                    }
+                    stroke.speed *= SLOWER;
+                }
+            }
+        }
+    }
+
+    /// Moves the foot to `place` by inverse kinematics and judges the pose.
+    fn reach(
+        &mut self,
+        body: &Body,
+        settings: &AdaptiveSettings,
+        stroke: &Stroke,
+        place: &Vector3<f64>,
+        what: Place,
+        steps: usize,
+    ) -> Result<(), Refusal> {
+        check(body, settings, (&mut self.ik, &mut self.pose, &mut self.angles), stroke, place, what, steps)
+    }
+
+    /// Follows a motion from the retraction to the way back; with a refusal, whether it is the strike's.
+    fn forecast(
+        &mut self,
+        body: &Body,
+        settings: &AdaptiveSettings,
+        motion: &Motion,
+        stroke: &Stroke,
+    ) -> Result<(), (Refusal, bool)> {
+        let swing = stroke.swing;
+        let support = swing.other();
+        let limits = &settings.limits;
+        self.angles.copy_from_slice(&self.lifted[swing as usize]);
+        let (start, end) = (motion.end_of(Phase::Raise), motion.end_of(Phase::MoveBack));
+        let contact = motion.contact.unwrap_or(end);
+        let fast = [motion.end_of(Phase::WindUp) - 2.0 * FINE, motion.end_of(Phase::Kick) + FINE];
+        let foot = &body.feet[support as usize];
+        let mut time = start;
+        let mut fine = 0;
+        let mut zmp = [0.0; 2];
+        let mut last: Option<f64> = None;
+        while time < end {
+            let quick = (fast[0]..fast[1]).contains(&time);
+            let goals = motion.goals(time);
+            let residual = self.ik.solve(&body.tree, &mut self.pose, &mut self.angles, swing, &goals, WAY);
+            let gap = miss(&residual);
+            if !matches!(gap.partial_cmp(&limits.reach), Some(o) if o.is_le()) {
+                return Err((Refusal::Unreachable { foot: swing, place: Place::Way, gap }, quick));
+            }
+            let (gap, pair) = body.tree.least_gap(&self.pose);
+            if gap < limits.clearance {
+                return Err((Refusal::SelfCollision { foot: swing, pair, gap }, quick));
+            }
+            let gap = ground_gap(body, &self.pose, swing);
+            if gap < GROUND {
+                return Err((Refusal::HitsGround { foot: swing, gap }, quick));
+            }
+            if quick {
+                if fine == 0 {
+                    self.dynamics.fill(body, support, &self.angles, &self.pose);
+                } else {
+                    self.dynamics.push(body, support, &self.angles, &self.pose);
+                }
+                fine += 1;
+            }
+            // Between the samples no joint may jump from one solution to another.
+            if let Some(last) = last {
+                let most = self
+                    .ik
+                    .joints()
+                    .map(|j| ((self.angles[j] - self.saved[j]).abs() / (time - last) / body.robot.joints[j].speed, j));
+                let (share, joint) = most.fold((0.0, 0), |a, b| if b.0 > a.0 { b } else { a });
+                if share > limits.speed * if quick { 1.0 } else { CALM } {
+                    return Err((Refusal::TooFast { foot: swing, asked: stroke.speed, share, joint }, quick));
+                }
+            }
+            self.saved.copy_from_slice(&self.angles);
+            last = Some(time);
+            if !quick {
+                self.dynamics.fill(body, support, &self.angles, &self.pose);
+                self.dynamics.solve(body, swing, &self.pose, FINE, false);
+                let [_, (share, joint)] = self.dynamics.shares(&body.robot);
+                if share > limits.hold {
+                    return Err((Refusal::TooHeavy { foot: swing, share, joint }, quick));
+                }
+            }
+            if quick && fine >= 3 {
+                // The pose is one sample ahead of the middle: good enough for axes of a forecast.
+                let now = self.dynamics.solve(body, swing, &self.pose, FINE, false);
+                // To tip takes about sqrt(h / g): what is over sooner does not count in full.
+                let share = if fine == 3 { 1.0 } else { FINE / (TIPPING + FINE) };
+                zmp = [0, 1].map(|k| zmp[k] + share * (now[k] - zmp[k]));
+                let [(speed, fastest), (torque, strongest)] = self.dynamics.shares(&body.robot);
+                // After the contact a joint may lag: nothing depends on it.
+                if time <= contact + FINE {
+                    for (share, most, joint) in [(speed, limits.speed, fastest), (torque, limits.torque, strongest)] {
+                        if share > most {
+                            return Err((Refusal::TooFast { foot: swing, asked: stroke.speed, share, joint }, quick));
+                        }
+                    }
+                }
+                let by = [(zmp[0], foot.stand_x), (zmp[1], foot.stand_y)]
+                    .map(|(p, [low, high])| (low + limits.edge - p).max(p - high + limits.edge))
+                    .into_iter()
+                    .fold(f64::NEG_INFINITY, f64::max);
+                if by > 0.0 {
+                    return Err((Refusal::OffBalance { foot: swing, by }, quick));
+                }
+            }
+            time += if quick { FINE } else { COARSE.min((fast[0] - time).max(FINE)) };
+        }
+        Ok(())
+    }
+
+    /// The largest share of a motor's torque that holding the pose with `angles` takes, and its joint.
+    pub(crate) fn load(&mut self, body: &Body, swing: Side, angles: &[f64], pose: &TreePose) -> (f64, usize) {
+        self.dynamics.fill(body, swing.other(), angles, pose);
+        self.dynamics.solve(body, swing, pose, FINE, false);
+        let [_, torque] = self.dynamics.shares(&body.robot);
+        torque
+    }
+
+    /// The request nearest to `request` that can be kicked: its ball (m) and direction (rad).
+    fn nearest(
+        &mut self,
+        body: &Body,
+        settings: &AdaptiveSettings,
+        grid: &Grid,
+        request: &KickRequest,
+    ) -> Option<([f64; 2], f64)> {
+        // A step of the ball weighs as much as one of the direction.
+        let mut steps: Vec<[i32; 3]> = Vec::new();
+        for x in -20..=20 {
+            for y in -20..=20 {
+                for turn in -9..=9 {
+                    steps.push([x, y, turn]);
+                }
+            }
+        }
+        steps.sort_by_key(|[x, y, turn]| (x * x + y * y + turn * turn, turn.abs(), x.abs(), *x, *y, *turn));
+        let mut plans = 0;
+        for [x, y, turn] in steps {
+            let ball = [request.ball[0] + f64::from(x) * NEAREST_BALL, request.ball[1] + f64::from(y) * NEAREST_BALL];
+            let direction = wrap(request.direction + f64::from(turn) * NEAREST_DIRECTION);
+            let asked = KickRequest { ball, direction, ball_velocity: [0.0; 2], hold: false, ..*request };
+            match self.plan_at(body, settings, grid, &asked, (ball, [0.0; 2]), 0.0) {
+                Ok(_) => return Some((ball, direction)),
+                Err(Refusal::OutsideGrid { .. }) => {}
+                Err(_) => plans += 1,
+            }
+            if plans >= NEAREST_PLANS {
+                break;
+            }
+        }
+        None
+    }
+}
+
+/// Moves a foot to `place` of `stroke` by inverse kinematics and judges the pose.
+pub(crate) fn check(
+    body: &Body,
+    settings: &AdaptiveSettings,
+    (ik, pose, angles): (&mut Ik, &mut TreePose, &mut Vec<f64>),
+    stroke: &Stroke,
+    place: &Vector3<f64>,
+    what: Place,
+    steps: usize,
+) -> Result<(), Refusal> {
+    let trunk = trunk_support(body, settings, stroke.swing, stroke.yaw);
+    let goals = goals(&stroke.pose(place), &trunk);
+    let residual = ik.solve(&body.tree, pose, angles, stroke.swing, &goals, steps);
+    let gap = miss(&residual);
+    // Written so that a NaN fails.
+    if !matches!(gap.partial_cmp(&settings.limits.reach), Some(o) if o.is_le()) {
+        return Err(Refusal::Unreachable { foot: stroke.swing, place: what, gap });
+    }
+    let (gap, pair) = body.tree.least_gap(pose);
+    if gap < settings.limits.clearance {
+        return Err(Refusal::SelfCollision { foot: stroke.swing, pair, gap });
+    }
+    let gap = ground_gap(body, pose, stroke.swing);
+    if gap < GROUND {
+        return Err(Refusal::HitsGround { foot: stroke.swing, gap });
+    }
+    Ok(())
+}
+
+/// Height of the swing foot's lowest point over the support sole's plane, m.
+fn ground_gap(body: &Body, pose: &TreePose, swing: Side) -> f64 {
+    let sole = &body.robot.leg(swing.other()).sole;
+    let up = pose.rotation[sole.link] * Vector3::z();
+    let origin = pose.point(sole);
+    let points = body.robot.contacts.iter().filter(|contact| contact.leg == swing);
+    points.map(|contact| up.dot(&(pose.point(&contact.at) - origin)) - contact.radius).fold(f64::INFINITY, f64::min)
+}
+
+/// Stated standard deviation of the direction, rad.
+pub(crate) fn precision(settings: &AdaptiveSettings, stroke: &Stroke) -> f64 {
+    let a = &settings.accuracy;
+    let least = match stroke.face {
+        Face::Front => a.front,
+        Face::Inner | Face::Outer | Face::Back => a.side,
+        Face::Corner => a.corner,
+    };
+    least + a.angle * stroke.forecast.clamp(-1.0, 1.0).acos()
+}
+
+/// The refusal that tells more: what came nearest to being possible.
+fn graver(old: Option<Refusal>, new: Refusal) -> Refusal {
+    let rank = |r: &Refusal| match r {
+        Refusal::Unreachable { place: Place::Contact, gap, .. } => -gap.min(10.0),
+        Refusal::Unreachable { gap, .. } => 1.0 - gap.min(0.9),
+        Refusal::SelfCollision { .. } | Refusal::HitsGround { .. } => 2.0,
+        Refusal::OffBalance { .. } | Refusal::TooHeavy { .. } => 3.0,
+        Refusal::TooFast { share, .. } => 5.0 - (share / 100.0).min(0.9),
+        _ => 9.0,
+    };
+    match old {
+        Some(old) if rank(&old) >= rank(&new) => old,
+        _ => new,
+    }
+}
