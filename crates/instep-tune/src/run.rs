@@ -20,7 +20,7 @@ use crate::tuning::Tuning;
 /// of the comparison from the two numbers below the next one's. KickBench's own seeds are small numbers.
 const SEEDS: u64 = 1_000_000;
 /// Cases of the final choice for each case of a sample.
-const FINAL: usize = 5;
+const FINAL: usize = 3;
 /// Samples in the final choice.
 const FINALISTS: usize = 4;
 

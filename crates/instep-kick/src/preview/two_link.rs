@@ -4,7 +4,11 @@
 //! roll (pitch) of ankle and hip are the arm's joints. With the wanted point at distance r and bearing phi from the ankle
 //! and the links' lengths l1, l2, the law of cosines gives the angles. The rest of the robot counts as fixed to the second
 //! link, which is the approximation: the swing leg moves with it, and what a turn in one plane does to the other is left
-//! out. How far the knee is bent follows from the base's height. [`crate::ik`] has no such error; this file is beside it to be compared, and for robots without a model.
+//! out. How far the knee is bent follows from the base's height, which the paper leaves open.
+//!
+//! Its error, measured on NAO (tests/it/preview.rs): one solution for the way from the stand to the support foot, 5 cm,
+//! misses by 4.7 mm; solved anew in each tick of a kick, it is 0.1 mm (RMS) and 1.4 mm at most. The inverse kinematics of
+//! the whole body, [`crate::ik`], which the engine uses unless told otherwise, misses by less than 0.01 mm.
 //!
 //! The paper's slips: (8) prints r without squares. In (9) and (11) alpha - pi and alpha + pi are the same angle, and
 //! theta_2 = alpha - pi does not go with theta_1 = phi - beta. The two solutions of the arm are
