@@ -65,6 +65,9 @@ pub fn engines() -> impl Iterator<Item = &'static str> {
     ENTRIES.iter().map(|entry| entry.name)
 }
 
+/// The engines that are compared unless others are asked for: one of each kind, as it is meant to be used.
+pub const LEADING: [&str; 3] = ["dynamic", "adaptive", "preview-tuned"];
+
 /// A robot with what its trials share.
 #[derive(Debug, Clone)]
 pub struct Subject {

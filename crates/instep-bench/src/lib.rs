@@ -22,7 +22,7 @@ pub mod run;
 pub mod scenario;
 pub mod table;
 
-pub use engines::{Subject, engines};
+pub use engines::{LEADING, Subject, engines};
 pub use error::BenchError;
 pub use run::Bench;
 pub use scenario::Scenario;

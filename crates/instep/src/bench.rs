@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::Args;
 use instep_bench::directions::directions;
 use instep_bench::table::{csv, json, markdown, rows};
-use instep_bench::{Bench as KickBench, BenchError, Scenario, Subject, engines, page, table::rows_over_seeds};
+use instep_bench::{Bench as KickBench, BenchError, LEADING, Scenario, Subject, page, table::rows_over_seeds};
 
 use crate::failure::Failure;
 use crate::output::{self, Output};
@@ -15,7 +15,7 @@ use crate::{files, places};
 /// The arguments of `instep bench`.
 #[derive(Debug, Args)]
 pub(crate) struct Bench {
-    /// Engines, separated by commas [default: all]
+    /// Engines, separated by commas [default: dynamic,adaptive,preview-tuned, where a robot has settings for them]
     #[arg(long, value_name = "ENGINE", value_delimiter = ',')]
     engine: Vec<String>,
     /// Robots, separated by commas
@@ -30,7 +30,7 @@ pub(crate) struct Bench {
     /// Number of seeds, counted from 1 [default: 3]
     #[arg(long, value_name = "N")]
     seeds: Option<u64>,
-    /// One seed and 20 requests, in place of three seeds and 200
+    /// One seed and 12 requests, in place of three seeds and 200
     #[arg(long)]
     quick: bool,
     /// Folder for bench.md, bench.csv, bench.json and bench.html
@@ -121,8 +121,7 @@ impl Bench {
             .iter()
             .map(|name| Ok(Subject::of(places::robot(name)?)?))
             .collect::<Result<Vec<_>, Failure>>()?;
-        let known: Vec<String> = engines().map(str::to_owned).collect();
-        let asked = if self.engine.is_empty() { known } else { self.engine.clone() };
+        let asked = if self.engine.is_empty() { LEADING.map(str::to_owned).to_vec() } else { self.engine.clone() };
         for engine in &asked {
             let (mut known, mut unknown) = (false, None);
             for subject in &subjects {
@@ -136,7 +135,7 @@ impl Bench {
                 return Err(error.into());
             }
         }
-        let (requests, seeds) = if self.quick { (20, 1) } else { (200, 3) };
+        let (requests, seeds) = if self.quick { (12, 1) } else { (200, 3) };
         let (requests, seeds) = (self.requests.unwrap_or(requests), self.seeds.unwrap_or(seeds));
         for (option, number) in [("--requests", requests as u64), ("--seeds", seeds)] {
             if !(1..=1_000_000).contains(&number) {
