@@ -22,39 +22,51 @@ struct Entry {
     name: &'static str,
     /// Its settings' file in a robot's folder.
     file: &'static str,
-    /// Makes it from the text of that file.
-    make: fn(&Subject, &str) -> Made,
+    /// Makes it from that file's path and text.
+    make: fn(&Subject, &str, &str) -> Made,
 }
 
 /// Every engine: one line each.
 const ENTRIES: &[Entry] = &[
-    Entry { name: "dynamic", file: "dynamic.toml", make: |subject, text| subject.dynamic(text, |_| ()) },
+    Entry { name: "dynamic", file: "dynamic.toml", make: |subject, file, text| subject.dynamic(file, text, |_| ()) },
     Entry {
         name: "dynamic-open",
         file: "dynamic.toml",
-        make: |subject, text| subject.dynamic(text, |settings| settings.feedback.on = false),
+        make: |subject, file, text| subject.dynamic(file, text, |settings| settings.feedback.on = false),
     },
-    Entry { name: "preview", file: "preview.toml", make: |subject, text| subject.preview("preview.toml", text) },
+    Entry {
+        name: "dynamic-tuned",
+        file: "dynamic-tuned.toml",
+        make: |subject, file, text| subject.dynamic(file, text, |_| ()),
+    },
+    Entry { name: "preview", file: "preview.toml", make: |subject, file, text| subject.preview(file, text) },
     Entry {
         name: "preview-tuned",
         file: "preview-tuned.toml",
-        make: |subject, text| subject.preview("preview-tuned.toml", text),
+        make: |subject, file, text| subject.preview(file, text),
     },
-    Entry { name: "adaptive", file: "adaptive.toml", make: |subject, text| subject.adaptive(text, |_| ()) },
+    Entry { name: "adaptive", file: "adaptive.toml", make: |subject, file, text| subject.adaptive(file, text, |_| ()) },
+    Entry {
+        name: "adaptive-tuned",
+        file: "adaptive-tuned.toml",
+        make: |subject, file, text| subject.adaptive(file, text, |_| ()),
+    },
     Entry {
         name: "adaptive-once",
         file: "adaptive.toml",
-        make: |subject, text| subject.adaptive(text, |settings| settings.feedback.follow_ball = false),
+        make: |subject, file, text| subject.adaptive(file, text, |settings| settings.feedback.follow_ball = false),
     },
     Entry {
         name: "adaptive-sphere",
         file: "adaptive.toml",
-        make: |subject, text| subject.adaptive(text, |settings| settings.kick.true_shape = false),
+        make: |subject, file, text| subject.adaptive(file, text, |settings| settings.kick.true_shape = false),
     },
     Entry {
         name: "adaptive-inclination",
         file: "adaptive.toml",
-        make: |subject, text| subject.adaptive(text, |settings| settings.stabiliser = Stabiliser::Inclination),
+        make: |subject, file, text| {
+            subject.adaptive(file, text, |settings| settings.stabiliser = Stabiliser::Inclination)
+        },
     },
 ];
 
@@ -180,24 +192,23 @@ impl Subject {
     /// # Errors
     /// When there is none, or its settings do not fit the robot.
     pub fn engine(&self, name: &str) -> Made {
-        (entry(name)?.make)(self, &self.settings(name)?)
+        let file = self.settings_file(name)?.display().to_string();
+        (entry(name)?.make)(self, &file, &self.settings(name)?)
     }
 
-    fn dynamic(&self, text: &str, change: fn(&mut DynamicSettings)) -> Made {
-        let file = self.folder.join("dynamic.toml").display().to_string();
-        let mut settings = DynamicSettings::parse(&file, text)?;
+    fn dynamic(&self, file: &str, text: &str, change: fn(&mut DynamicSettings)) -> Made {
+        let mut settings = DynamicSettings::parse(file, text)?;
         change(&mut settings);
         Ok(Box::new(DynamicKick::new(Arc::clone(&self.robot), self.ball, settings)?))
     }
 
     fn preview(&self, file: &str, text: &str) -> Made {
-        let settings = PreviewSettings::parse(&self.folder.join(file).display().to_string(), text)?;
+        let settings = PreviewSettings::parse(file, text)?;
         Ok(Box::new(PreviewKick::new(Arc::clone(&self.robot), self.ball, settings)?))
     }
 
-    fn adaptive(&self, text: &str, change: fn(&mut AdaptiveSettings)) -> Made {
-        let file = self.folder.join("adaptive.toml").display().to_string();
-        let mut settings = AdaptiveSettings::parse(&file, text)?;
+    fn adaptive(&self, file: &str, text: &str, change: fn(&mut AdaptiveSettings)) -> Made {
+        let mut settings = AdaptiveSettings::parse(file, text)?;
         change(&mut settings);
         let grid = Arc::new(load_grid(&self.folder)?);
         Ok(Box::new(AdaptiveKick::new(Arc::clone(&self.robot), self.ball, settings, grid)?))
