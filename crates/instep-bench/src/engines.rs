@@ -7,7 +7,7 @@ use std::sync::Arc;
 use instep_kick::adaptive::{AdaptiveKick, AdaptiveSettings, Stabiliser, load_grid};
 use instep_kick::dynamic::{DynamicKick, DynamicSettings};
 use instep_kick::preview::{PreviewKick, PreviewSettings};
-use instep_kick::{BallModel, KickEngine};
+use instep_kick::{BallModel, KickEngine, Settings};
 use instep_robot::Robot;
 use instep_sim::settings::{Ball, WorldSettings};
 

@@ -1,10 +1,9 @@
 //! What a team's engines assume of the ball that their robot plays: `robots/<name>/ball.toml`, one file for all engines.
 
-use std::path::Path;
-
 use serde::{Deserialize, Serialize};
 
 use crate::KickError;
+use crate::settings::{Settings, within};
 
 /// A ball and its impact.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -20,48 +19,19 @@ pub struct BallModel {
     pub deceleration: f64,
 }
 
+impl Settings for BallModel {
+    const FILE: &'static str = "ball.toml";
+    const HOLDS: &'static str = "the ball";
+
+    fn validate(&self) -> Result<(), KickError> {
+        within("radius", self.radius, 0.01, 0.2)?;
+        within("mass", self.mass, 0.005, 1.0)?;
+        within("restitution", self.restitution, 0.01, 0.99)?;
+        within("deceleration", self.deceleration, 0.01, 5.0)
+    }
+}
+
 impl BallModel {
-    /// Reads `ball.toml` in a robot's folder.
-    ///
-    /// # Errors
-    /// When it cannot be read, or a value cannot be: with file and field.
-    pub fn load(folder: &Path) -> Result<Self, KickError> {
-        let file = folder.join("ball.toml");
-        let name = file.display().to_string();
-        let text = std::fs::read_to_string(&file).map_err(|e| KickError::Read {
-            file: name.clone(),
-            detail: format!("{e}; expected the ball that this robot plays"),
-        })?;
-        let ball: Self = toml::from_str(&text)
-            .map_err(|e| KickError::Parse { file: name.clone(), detail: e.to_string().trim_end().to_owned() })?;
-        ball.validate().map_err(|error| match error {
-            KickError::Setting { field, found, expected } => {
-                KickError::Setting { field: format!("{name}: {field}"), found, expected }
-            }
-            other => other,
-        })?;
-        Ok(ball)
-    }
-
-    /// Checks every value.
-    ///
-    /// # Errors
-    /// Names the first field whose value cannot be.
-    pub fn validate(&self) -> Result<(), KickError> {
-        for (field, value, low, high) in [
-            ("radius", self.radius, 0.01, 0.2),
-            ("mass", self.mass, 0.005, 1.0),
-            ("restitution", self.restitution, 0.01, 0.99),
-            ("deceleration", self.deceleration, 0.01, 5.0),
-        ] {
-            if !(low..=high).contains(&value) {
-                let expected = format!("a number in [{low}, {high}]");
-                return Err(KickError::Setting { field: field.to_owned(), found: value.to_string(), expected });
-            }
-        }
-        Ok(())
-    }
-
     /// Ball speed over foot speed for an effective mass (kg) of the foot (facts/physics-of-the-kick.md).
     #[must_use]
     pub fn gain(&self, mass: f64) -> f64 {

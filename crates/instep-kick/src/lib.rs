@@ -2,6 +2,7 @@
 //!
 //! - [`request`]: what is asked, and the causes of a refusal; [`dialect`]: the request formats that teams already send.
 //! - [`ball`]: the ball that a robot plays.
+//! - [`settings`]: the files of a robot's folder, read and checked.
 //! - [`engine`]: the trait that every engine implements.
 //! - [`adaptive`]: paper 3's engine: retraction and strike in a measured reachability grid, following the ball.
 //! - [`dynamic`]: paper 2's engine: splines of foot and trunk in the support foot's frame, stabilised by the centre of
@@ -26,6 +27,7 @@ pub mod playback;
 pub mod policy;
 pub mod preview;
 pub mod request;
+pub mod settings;
 pub mod track;
 pub mod tree;
 pub mod whole_body;
@@ -35,3 +37,4 @@ pub use engine::{BreakOff, Face, KickEngine, KickPlan, KickStatus, Phase, Progre
 pub use error::KickError;
 pub use playback::Playback;
 pub use request::{KickRequest, Place, Refusal, Strength};
+pub use settings::Settings;

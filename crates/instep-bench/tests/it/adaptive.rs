@@ -5,6 +5,7 @@ use std::sync::Arc;
 use instep_bench::cell::{CellKey, Kicked, run_case, run_cell, world};
 use instep_bench::directions::directions;
 use instep_bench::{Scenario, Subject};
+use instep_kick::Settings;
 use instep_kick::adaptive::{AdaptiveKick, AdaptiveSettings, grid_hash, load_grid};
 use instep_kick::{KickError, KickRequest, Refusal};
 use instep_robot::Robot;

@@ -27,6 +27,7 @@ use crate::ball::BallModel;
 use crate::engine::{BreakOff, KickEngine, KickPlan, KickStatus, Phase, Progress};
 use crate::ik::Ik;
 use crate::request::{KickRequest, Place, Refusal, Strength};
+use crate::settings::Settings;
 use crate::tree::TreePose;
 use crate::whole_body::body::Body;
 use crate::whole_body::drive::{Drive, Footing, Wanted};

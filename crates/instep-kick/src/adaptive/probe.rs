@@ -18,6 +18,7 @@ use crate::adaptive::motion::{goals, trunk_support};
 use crate::adaptive::settings::AdaptiveSettings;
 use crate::ball::BallModel;
 use crate::ik::Ik;
+use crate::settings::Settings;
 use crate::tree::TreePose;
 use crate::whole_body::body::Body;
 use crate::whole_body::drive::{Drive, Footing, Wanted};

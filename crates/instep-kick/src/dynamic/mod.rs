@@ -26,6 +26,7 @@ use crate::ball::BallModel;
 use crate::engine::{KickEngine, KickPlan, KickStatus, Phase, Progress};
 use crate::ik::Ik;
 use crate::request::{KickRequest, Refusal};
+use crate::settings::Settings;
 use crate::tree::TreePose;
 use crate::whole_body::balance::Balance;
 use crate::whole_body::body::Body;

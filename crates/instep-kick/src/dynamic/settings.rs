@@ -2,12 +2,12 @@
 //! range and effect; a file with an unknown field is refused, and so is a value that cannot be, with its path.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
 use crate::KickError;
-use crate::whole_body::{Feedback, Limits, Stance, within};
+use crate::settings::{Settings, within};
+use crate::whole_body::{Feedback, Limits, Stance};
 
 /// All numbers of the engine for one robot.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -95,37 +95,11 @@ pub struct Accuracy {
     pub side: f64,
 }
 
-impl DynamicSettings {
-    /// Reads and validates the settings from a robot's folder or the file itself.
-    ///
-    /// # Errors
-    /// When the file is missing, is not TOML of this layout, or a value cannot be.
-    pub fn load(path: &Path) -> Result<Self, KickError> {
-        let file = if path.is_dir() { path.join("dynamic.toml") } else { path.to_owned() };
-        let name = file.display().to_string();
-        let text = std::fs::read_to_string(&file).map_err(|e| KickError::Read {
-            file: name.clone(),
-            detail: format!("{e}; expected the dynamic engine's settings for this robot"),
-        })?;
-        Self::parse(&name, &text)
-    }
+impl Settings for DynamicSettings {
+    const FILE: &'static str = "dynamic.toml";
+    const HOLDS: &'static str = "the dynamic engine's settings";
 
-    /// Reads and validates the settings from `text`; `name` stands in errors.
-    ///
-    /// # Errors
-    /// As [`DynamicSettings::load`].
-    pub fn parse(name: &str, text: &str) -> Result<Self, KickError> {
-        let settings: Self = toml::from_str(text)
-            .map_err(|e| KickError::Parse { file: name.to_owned(), detail: e.to_string().trim_end().to_owned() })?;
-        settings.validate()?;
-        Ok(settings)
-    }
-
-    /// Checks every value.
-    ///
-    /// # Errors
-    /// Names the first field whose value cannot be.
-    pub fn validate(&self) -> Result<(), KickError> {
+    fn validate(&self) -> Result<(), KickError> {
         let (s, t) = (&self.swing, &self.times);
         for (field, value, low, high) in [
             ("control_period", self.control_period, 0.001, 0.02),

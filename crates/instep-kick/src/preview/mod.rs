@@ -32,6 +32,7 @@ use crate::ball::BallModel;
 use crate::engine::{KickEngine, KickPlan, KickStatus, Phase, Progress};
 use crate::ik::{Goals, Ik, Residual};
 use crate::request::{KickRequest, Refusal};
+use crate::settings::Settings;
 use crate::tree::{Tree, TreePose};
 use crate::whole_body::balance::Balance;
 use crate::whole_body::body::Body;

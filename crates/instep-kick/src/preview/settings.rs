@@ -2,14 +2,14 @@
 //! and effect; a file with an unknown field is refused, and so is a value that cannot be, with its path.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
 use crate::KickError;
 use crate::dynamic::Accuracy;
 use crate::preview::zmp::Trust;
-use crate::whole_body::{Feedback, Limits, Pid, within};
+use crate::settings::{Settings, within};
+use crate::whole_body::{Feedback, Limits, Pid};
 
 /// All numbers of the engine for one robot.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -184,31 +184,6 @@ pub struct Gains {
 }
 
 impl PreviewSettings {
-    /// Reads and validates the settings from a robot's folder or the file itself.
-    ///
-    /// # Errors
-    /// When the file is missing, is not TOML of this layout, or a value cannot be.
-    pub fn load(path: &Path) -> Result<Self, KickError> {
-        let file = if path.is_dir() { path.join("preview.toml") } else { path.to_owned() };
-        let name = file.display().to_string();
-        let text = std::fs::read_to_string(&file).map_err(|e| KickError::Read {
-            file: name.clone(),
-            detail: format!("{e}; expected the preview engine's settings for this robot"),
-        })?;
-        Self::parse(&name, &text)
-    }
-
-    /// Reads and validates the settings from `text`; `name` stands in errors.
-    ///
-    /// # Errors
-    /// As [`PreviewSettings::load`].
-    pub fn parse(name: &str, text: &str) -> Result<Self, KickError> {
-        let settings: Self = toml::from_str(text)
-            .map_err(|e| KickError::Parse { file: name.to_owned(), detail: e.to_string().trim_end().to_owned() })?;
-        settings.validate()?;
-        Ok(settings)
-    }
-
     /// Whether a loop is closed.
     #[must_use]
     pub fn has(&self, stabiliser: Stabiliser) -> bool {
@@ -234,12 +209,13 @@ impl PreviewSettings {
             follow_ball: false,
         }
     }
+}
 
-    /// Checks every value.
-    ///
-    /// # Errors
-    /// Names the first field whose value cannot be.
-    pub fn validate(&self) -> Result<(), KickError> {
+impl Settings for PreviewSettings {
+    const FILE: &'static str = "preview.toml";
+    const HOLDS: &'static str = "the preview engine's settings";
+
+    fn validate(&self) -> Result<(), KickError> {
         let (w, k, s, t, f) = (&self.regulator, &self.kick, &self.swing, &self.times, &self.feedback);
         for (field, value, low, high) in [
             ("control_period", self.control_period, 0.001, 0.02),

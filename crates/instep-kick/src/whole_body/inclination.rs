@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::KickError;
 use crate::ik::Goals;
-use crate::whole_body::settings::within;
+use crate::settings::within;
 
 /// Numbers of the body-inclination stabiliser.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

@@ -11,5 +11,4 @@ mod settings;
 pub(crate) mod torque;
 
 pub use inclination::Inclination;
-pub(crate) use settings::within;
 pub use settings::{Feedback, Limits, Pid, Stance};

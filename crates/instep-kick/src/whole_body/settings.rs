@@ -1,8 +1,9 @@
-//! Settings that several engines have in their files: the stance, what counts as
-//! possible, and the closed loop on the centre of pressure.
+//! Settings that several engines have in their files: the stance, what counts as possible, and the closed loop on the centre of pressure.
+
+use serde::{Deserialize, Serialize};
 
 use crate::KickError;
-use serde::{Deserialize, Serialize};
+use crate::settings::within;
 
 /// The closed loop.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -149,16 +150,4 @@ impl Feedback {
         }
         Ok(())
     }
-}
-
-/// Checks that the setting `field` lies between `low` and `high`.
-///
-/// # Errors
-/// When it does not, or is not a number.
-pub(crate) fn within(field: &str, value: f64, low: f64, high: f64) -> Result<(), KickError> {
-    if (low..=high).contains(&value) {
-        return Ok(());
-    }
-    let expected = format!("a number in [{low}, {high}]");
-    Err(KickError::Setting { field: field.to_owned(), found: value.to_string(), expected })
 }

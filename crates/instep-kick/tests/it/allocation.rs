@@ -4,6 +4,7 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::sync::Arc;
 
+use instep_kick::Settings;
 use instep_kick::adaptive::AdaptiveKick;
 use instep_kick::dynamic::DynamicKick;
 use instep_kick::policy::PolicyKick;

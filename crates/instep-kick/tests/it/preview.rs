@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use instep_kick::Settings;
 use instep_kick::preview::{Balanced, Com, PreviewKick, PreviewSettings};
 use instep_kick::{BallModel, Face, KickEngine, KickPlan, KickRequest, KickStatus, Phase, Refusal};
 use instep_motion::phase::Side;
