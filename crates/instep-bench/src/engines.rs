@@ -110,7 +110,7 @@ impl Subject {
     /// # Errors
     /// When the ball cannot be read.
     pub fn of(robot: Robot) -> Result<Self, BenchError> {
-        let folder = robot.model_file().parent().unwrap_or(Path::new(".")).to_owned();
+        let folder = robot.folder().to_owned();
         let ball = BallModel::load(&folder)?;
         let data = robot.data();
         let [left, right] = [0, 1].map(|side| data.point(&robot.legs[side].sole));

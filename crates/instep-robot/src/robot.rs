@@ -256,6 +256,12 @@ impl Robot {
         &self.model_file
     }
 
+    /// The folder that it was loaded from, where its engines' settings lie.
+    #[must_use]
+    pub fn folder(&self) -> &Path {
+        self.model_file.parent().unwrap_or(Path::new("."))
+    }
+
     /// An editable copy of the model with the contact spheres, without the model's own actuators, for building a
     /// world around it. Body, joint and geom names are those of [`Robot::model`].
     ///

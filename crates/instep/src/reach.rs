@@ -37,7 +37,7 @@ impl Reach {
     /// When robot or settings cannot be read, a file cannot be written, or the simulation diverges.
     pub(crate) fn run(self, output: &Output) -> Result<ExitCode, Failure> {
         let robot = Arc::new(places::robot(&self.robot)?);
-        let folder = robot.model_file().parent().map(std::path::Path::to_owned).unwrap_or_default();
+        let folder = robot.folder().to_owned();
         let settings = AdaptiveSettings::load(&folder).map_err(Failure::input)?;
         let file = folder.join(GRID_FILE);
         files::check_file(&file)?;

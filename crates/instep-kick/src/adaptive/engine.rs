@@ -114,9 +114,7 @@ impl AdaptiveKick {
         if grid.hash() != hash {
             return Err(KickError::OtherGrid { robot: robot.name.clone(), found: grid.hash(), expected: hash });
         }
-        let coupled: Vec<[usize; 2]> =
-            settings.coupled.iter().filter_map(|[a, b]| Some([robot.joint_index(a)?, robot.joint_index(b)?])).collect();
-        let dynamics = Dynamics::new(&robot, coupled);
+        let dynamics = Dynamics::new(&robot, &settings.coupled);
         let (body, drive) = parts(robot, ball, &settings)?;
         let planner = Planner::new(&body, &settings, drive.ik.clone(), dynamics);
         Ok(Self {
@@ -151,7 +149,7 @@ impl AdaptiveKick {
     /// # Errors
     /// As [`BallModel::load`], [`AdaptiveSettings::load`], [`load_grid`] and [`AdaptiveKick::new`].
     pub fn load(robot: Arc<Robot>) -> Result<Self, KickError> {
-        let folder = robot.model_file().parent().unwrap_or(FilePath::new(".")).to_owned();
+        let folder = robot.folder().to_owned();
         let settings = AdaptiveSettings::load(&folder)?;
         let grid = load_grid(&folder)?;
         Self::new(robot, BallModel::load(&folder)?, settings, Arc::new(grid))

@@ -46,9 +46,7 @@ pub const GRID_FILE: &str = "reach.bin";
 fn parts(robot: Arc<Robot>, ball: BallModel, settings: &AdaptiveSettings) -> Result<(Body, Drive), KickError> {
     let ik = Ik::new(&robot, &settings.coupled, settings.limits.joint_margin, settings.limits.knee_bend)?
         .with_weights(Weights { roll: ROLL, ..Weights::default() });
-    let coupled: Vec<[usize; 2]> =
-        settings.coupled.iter().filter_map(|[a, b]| Some([robot.joint_index(a)?, robot.joint_index(b)?])).collect();
-    let dynamics = Dynamics::new(&robot, coupled);
+    let dynamics = Dynamics::new(&robot, &settings.coupled);
     let stabiliser = match settings.stabiliser {
         Stabiliser::Pressure => pressure(settings.feedback),
         Stabiliser::Inclination => Loop::Inclination(Lean::new(settings.inclination)),

@@ -91,14 +91,12 @@ impl DynamicKick {
     pub fn new(robot: Arc<Robot>, ball: BallModel, settings: DynamicSettings) -> Result<Self, KickError> {
         settings.validate()?;
         let ik = Ik::new(&robot, &settings.coupled, settings.limits.joint_margin, settings.limits.knee_bend)?;
-        let coupled: Vec<[usize; 2]> =
-            settings.coupled.iter().filter_map(|[a, b]| Some([robot.joint_index(a)?, robot.joint_index(b)?])).collect();
         let body = Body::new(Arc::clone(&robot), ball, &settings.arms)?;
-        let planner = Planner::new(&body, &settings, ik.clone(), Dynamics::new(&robot, coupled.clone()));
+        let planner = Planner::new(&body, &settings, ik.clone(), Dynamics::new(&robot, &settings.coupled));
         let motion = Motion::standing(&body, Side::Right);
         let mut pose = body.tree.pose();
         body.tree.update(&body.angles, &mut pose);
-        let mut dynamics = Dynamics::new(&robot, coupled);
+        let mut dynamics = Dynamics::new(&robot, &settings.coupled);
         dynamics.fill(&body, Side::Left, &body.angles, &pose);
         let angles = body.angles.clone();
         let balance = Balance::new(settings.feedback);
@@ -134,7 +132,7 @@ impl DynamicKick {
     /// # Errors
     /// As [`BallModel::load`], [`DynamicSettings::load`] and [`DynamicKick::new`].
     pub fn load(robot: Arc<Robot>) -> Result<Self, KickError> {
-        let folder = robot.model_file().parent().unwrap_or(std::path::Path::new(".")).to_owned();
+        let folder = robot.folder().to_owned();
         let settings = DynamicSettings::load(&folder)?;
         Self::new(robot, BallModel::load(&folder)?, settings)
     }

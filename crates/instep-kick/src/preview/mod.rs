@@ -145,8 +145,6 @@ impl PreviewKick {
     /// When a setting cannot be or does not fit the robot.
     pub fn new(robot: Arc<Robot>, ball: BallModel, settings: PreviewSettings) -> Result<Self, KickError> {
         settings.validate()?;
-        let coupled: Vec<[usize; 2]> =
-            settings.coupled.iter().filter_map(|[a, b]| Some([robot.joint_index(a)?, robot.joint_index(b)?])).collect();
         let body = Body::new(Arc::clone(&robot), ball, &settings.arms)?;
         let placer = Placer::new(&body, &settings)?;
         let dt = settings.control_period;
@@ -155,8 +153,8 @@ impl PreviewKick {
         let count = (weights.horizon / dt).round().max(1.0) as usize;
         let regulator = Regulator::new(dt, height, (weights.q, weights.r), count)?;
         let filter = Filter::new(dt, height, &settings.trust, 0.0)?;
-        let planner = Planner::new(&body, &settings, placer.clone(), Dynamics::new(&robot, coupled.clone()));
-        let mut dynamics = Dynamics::new(&robot, coupled);
+        let planner = Planner::new(&body, &settings, placer.clone(), Dynamics::new(&robot, &settings.coupled));
+        let mut dynamics = Dynamics::new(&robot, &settings.coupled);
         let mut pose = body.tree.pose();
         body.tree.update(&body.angles, &mut pose);
         dynamics.fill(&body, Side::Left, &body.angles, &pose);
@@ -195,7 +193,7 @@ impl PreviewKick {
     /// # Errors
     /// As [`BallModel::load`], [`PreviewSettings::load`] and [`PreviewKick::new`].
     pub fn load(robot: Arc<Robot>) -> Result<Self, KickError> {
-        let folder = robot.model_file().parent().unwrap_or(std::path::Path::new(".")).to_owned();
+        let folder = robot.folder().to_owned();
         let settings = PreviewSettings::load(&folder)?;
         Self::new(robot, BallModel::load(&folder)?, settings)
     }

@@ -31,7 +31,8 @@ pub(crate) struct Dynamics {
 }
 
 impl Dynamics {
-    pub(crate) fn new(robot: &Robot, coupled: Vec<[usize; 2]>) -> Self {
+    /// For `robot`, whose pairs of joints in `coupled` are turned by one motor each.
+    pub(crate) fn new(robot: &Robot, coupled: &[[String; 2]]) -> Self {
         let (nq, nv) = (robot.nq(), robot.nv());
         Self {
             data: robot.data(),
@@ -42,7 +43,7 @@ impl Dynamics {
             a: vec![0.0; nv],
             generalised: vec![0.0; nv],
             torques: vec![0.0; robot.joints.len()],
-            coupled,
+            coupled: coupled.iter().filter_map(|[a, b]| Some([robot.joint_index(a)?, robot.joint_index(b)?])).collect(),
         }
     }
 

@@ -68,7 +68,7 @@ fn a_tick_allocates_nothing() {
 #[test]
 fn a_tick_of_preview_allocates_nothing() {
     let robot = robot("nao");
-    let folder = robot.model_file().parent().unwrap();
+    let folder = robot.folder();
     for com in [Com::General, Com::TwoLink] {
         for cancel in [false, true] {
             let mut settings = PreviewSettings::load(folder).unwrap();

@@ -16,7 +16,7 @@ use nalgebra::Vector3;
 use crate::rig::{robot, standing};
 
 fn ball(robot: &Robot) -> BallModel {
-    BallModel::load(robot.model_file().parent().unwrap()).unwrap()
+    BallModel::load(robot.folder()).unwrap()
 }
 
 fn settings(robot: &Robot, file: &str) -> PreviewSettings {
