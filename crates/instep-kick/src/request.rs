@@ -8,6 +8,8 @@ use instep_motion::phase::Side;
 use instep_robot::Robot;
 use serde::{Deserialize, Serialize};
 
+use crate::ball::BallModel;
+
 /// How strong a kick should be.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -21,6 +23,15 @@ pub enum Strength {
 }
 
 impl Strength {
+    /// Speed (m/s) with which `ball` is to leave when the foot's effective mass is `mass` (kg).
+    pub(crate) fn ball_speed(self, ball: &BallModel, mass: f64) -> f64 {
+        match self {
+            Self::BallSpeed(v) => v,
+            Self::FootSpeed(v) => v * ball.gain(mass),
+            Self::Distance(d) => (2.0 * ball.deceleration * d).sqrt(),
+        }
+    }
+
     /// The number, whatever it means.
     #[must_use]
     pub fn value(self) -> f64 {

@@ -2,12 +2,9 @@
 //!
 //! A sight far from where the ball should be is a ball that was moved: the filter starts anew there, at rest.
 
-use instep_robot::LinkPoint;
-use instep_robot::control::Sensors;
-use nalgebra::{Rotation2, Vector2};
+use nalgebra::Vector2;
 
 use crate::ball::BallModel;
-use crate::tree::TreePose;
 
 /// Share of a surprise that moves the place.
 const ALPHA: f64 = 0.25;
@@ -35,14 +32,9 @@ impl Watch {
         Self { place, velocity, last: time, rolls: velocity.norm() > RESTING }
     }
 
-    /// Takes the newest sight; `pose` is the robot's, `sole` the support sole. What is not finite is left out.
-    pub(crate) fn see(&mut self, sensors: &Sensors, pose: &TreePose, sole: &LinkPoint, model: &BallModel) {
-        let Some(ball) = sensors.ball else { return };
-        let turn = pose.rotation[sole.link].transpose();
-        let base = turn * (-pose.point(sole));
-        let yaw = turn[(1, 0)].atan2(turn[(0, 0)]);
-        let at = base.xy() + Rotation2::new(yaw) * Vector2::new(ball.position[0], ball.position[1]);
-        let dt = ball.time - self.last;
+    /// Takes a sight at `time` (s): the ball in the support sole's frame, m. What is not finite is left out.
+    pub(crate) fn see(&mut self, time: f64, at: Vector2<f64>, model: &BallModel) {
+        let dt = time - self.last;
         // Written so that a NaN is left out.
         if !(at.x + at.y).is_finite() || !(dt > 1e-6) {
             return;
@@ -58,7 +50,7 @@ impl Watch {
                 self.velocity += off * (BETA / dt);
             }
         }
-        self.last = ball.time;
+        self.last = time;
     }
 
     /// Place (m) and velocity (m/s) after `time` (s).

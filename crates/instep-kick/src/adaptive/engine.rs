@@ -19,7 +19,7 @@ use crate::adaptive::ball::Watch;
 use crate::adaptive::geometry::{PARTS, Part};
 use crate::adaptive::grid::{CELL, Grid};
 use crate::adaptive::lookup::{Found, Query, look_up};
-use crate::adaptive::motion::{Motion, Stroke};
+use crate::adaptive::motion::{CAREFUL, Stroke, adapted};
 use crate::adaptive::plan::{Planner, check, push};
 use crate::adaptive::settings::AdaptiveSettings;
 use crate::adaptive::{GRID_FILE, grid_hash, parts};
@@ -31,6 +31,8 @@ use crate::settings::Settings;
 use crate::tree::TreePose;
 use crate::whole_body::body::Body;
 use crate::whole_body::drive::{Drive, Footing, Wanted};
+use crate::whole_body::motion::Motion;
+use crate::whole_body::timeline::Course;
 use crate::whole_body::torque::Dynamics;
 
 /// Distance between the ball and the one of the present stroke from which on another is looked up, m.
@@ -88,9 +90,7 @@ pub struct AdaptiveKick {
     unaimed: bool,
     broken_off: Option<BreakOff>,
     clock: f64,
-    status: KickStatus,
-    hold: bool,
-    cancel: bool,
+    course: Course,
     caught: bool,
     /// Scratch of the checks.
     probe: TreePose,
@@ -130,9 +130,7 @@ impl AdaptiveKick {
             unaimed: false,
             broken_off: None,
             clock: 0.0,
-            status: KickStatus::Idle,
-            hold: false,
-            cancel: false,
+            course: Course::idle(),
             caught: false,
             probe: body.tree.pose(),
             probe_angles: body.angles.clone(),
@@ -161,26 +159,20 @@ impl AdaptiveKick {
         &self.settings
     }
 
-    fn running(&self) -> bool {
-        matches!(self.status, KickStatus::Running | KickStatus::Holding | KickStatus::Cancelling)
-    }
-
     /// Looks after the ball: another stroke when it has moved, or a break-off. `time` is the motion's at the newest sample.
     fn adapt(&mut self, sensors: &Sensors, time: f64) {
         let (Some(mut watch), Some(stroke), Some(request)) = (self.watch, self.stroke, self.request) else { return };
-        let phase = self.motion.phase(time);
-        let Some(contact) =
-            self.motion.contact.filter(|_| matches!(self.status, KickStatus::Running | KickStatus::Holding))
-        else {
-            return;
-        };
+        let phase = self.motion.timeline.phase(time);
+        let kicks = self.course.running() && self.course.status() != KickStatus::Cancelling;
+        let Some(contact) = self.motion.contact.filter(|_| kicks) else { return };
         let left = contact - time;
         if phase > Phase::Kick || left < TOO_LATE {
             return;
         }
-        let support = self.body.robot.leg(stroke.swing.other()).sole;
         let model = self.body.ball;
-        watch.see(sensors, &self.drive.now, &support, &model);
+        if let Some(ball) = sensors.ball {
+            watch.see(ball.time, self.body.sighted(&self.drive.now, stroke.swing, ball.position), &model);
+        }
         self.watch = Some(watch);
         let (ball, velocity) = watch.at(sensors.time + left, &model);
         let off = (ball - stroke.ball).norm();
@@ -292,7 +284,7 @@ impl AdaptiveKick {
         let scratch = (&mut self.ik, &mut self.probe, &mut self.probe_angles);
         let good = check(&self.body, &self.settings, scratch, &stroke, &place, what, CHECK_STEPS).is_ok();
         let limit = self.settings.limits.hold;
-        if !good || self.planner.load(&self.body, stroke.swing, &self.probe_angles, &self.probe).0 > limit {
+        if !good || self.planner.rehearsal.load(&self.body, stroke.swing, &self.probe_angles, &self.probe).0 > limit {
             return;
         }
         candidate.passed += 1;
@@ -300,7 +292,7 @@ impl AdaptiveKick {
             self.candidate = Some(candidate);
             return;
         }
-        self.motion = self.motion.adapted(&self.body, &self.settings, time, &stroke);
+        self.motion = adapted(&self.motion, &self.body, &self.settings, time, &stroke);
         self.stroke = Some(stroke);
         self.search = None;
         self.unaimed = false;
@@ -309,18 +301,18 @@ impl AdaptiveKick {
     /// Breaks the kick off.
     fn give_up(&mut self, why: BreakOff) {
         self.broken_off = Some(why);
-        self.cancel = true;
+        self.course.cancel();
     }
 
     /// Puts the swing foot down at once when the robot tips toward it after the contact.
     fn catch(&mut self, sensors: &Sensors, time: f64) {
-        let late = matches!(self.motion.phase(time), Phase::MoveBack | Phase::Lower);
+        let late = matches!(self.motion.timeline.phase(time), Phase::MoveBack | Phase::Lower);
         if self.caught || !self.settings.feedback.on || !late {
             return;
         }
         // A NaN is no lean.
         if self.drive.lean(&self.body, self.motion.swing, sensors) > self.settings.feedback.catch {
-            self.motion = self.motion.caught(&self.body, &self.settings, time);
+            self.motion = self.motion.caught(&self.body, &self.settings.manner(), time);
             self.caught = true;
         }
     }
@@ -329,15 +321,15 @@ impl AdaptiveKick {
     fn waits(&mut self, time: f64) -> bool {
         // The newest sample stays before the strike, so that the retraction can still be changed.
         let next = time + self.settings.control_period;
-        if next < self.motion.end_of(Phase::WindUp) || self.motion.phase(self.clock) > Phase::WindUp {
+        if next < self.motion.timeline.end_of(Phase::WindUp) || self.motion.timeline.phase(self.clock) > Phase::WindUp {
             return false;
         }
-        if self.hold {
+        if self.course.hold {
             return true;
         }
         if self.lost > 0.0 && self.settings.feedback.follow_ball {
             self.waited += self.settings.control_period;
-            if self.waited > self.settings.times.wait {
+            if self.waited > self.settings.kick.wait {
                 self.give_up(BreakOff::Late);
             }
             return true;
@@ -368,32 +360,25 @@ impl Controller for AdaptiveKick {
         if self.settings.feedback.follow_ball {
             self.adapt(sensors, self.clock + ahead);
         }
-        if self.cancel {
-            self.cancel = false;
-            if self.running() {
-                self.motion = self.motion.cancelled(&self.body, &self.settings, self.clock + ahead);
-                self.status = KickStatus::Cancelling;
-                self.hold = false;
-            }
+        if self.course.turns_back() {
+            self.motion = self.motion.cancelled(&self.body, &self.settings.manner(), self.clock + ahead, CAREFUL);
         }
-        if self.running() {
-            let waits = self.status != KickStatus::Cancelling && self.waits(self.clock + ahead);
-            self.status = match self.status {
-                KickStatus::Running if waits => KickStatus::Holding,
-                KickStatus::Holding if !waits => KickStatus::Running,
-                status => status,
-            };
+        if self.course.running() {
+            let waits = self.course.status() != KickStatus::Cancelling && self.waits(self.clock + ahead);
+            self.course.step(waits);
             if !waits {
                 self.clock += dt;
             }
-            if self.clock >= self.motion.end() {
-                self.status =
-                    if self.status == KickStatus::Cancelling { KickStatus::Cancelled } else { KickStatus::Finished };
+            if self.clock >= self.motion.timeline.end() {
+                self.course.finish();
             }
         }
         self.catch(sensors, self.clock + ahead);
-        let footing =
-            Footing { swing: self.motion.swing, both: self.motion.both_feet(self.clock), active: self.running() };
+        let footing = Footing {
+            swing: self.motion.swing,
+            both: self.motion.timeline.both_feet(self.clock),
+            active: self.course.running(),
+        };
         let time = self.clock + ahead;
         let newest = Wanted { goals: self.motion.goals(time), arms: self.motion.arms(time) };
         self.drive.tick(&self.body, footing, &newest, dt, sensors, command);
@@ -410,16 +395,10 @@ impl KickEngine for AdaptiveKick {
     }
 
     fn plan(&mut self, request: &KickRequest, sensors: &Sensors) -> Result<KickPlan, Refusal> {
-        if self.running() {
+        if self.course.running() {
             return Err(Refusal::Busy);
         }
-        for (joint, (now, stand)) in sensors.joint_positions.iter().zip(&self.body.angles).enumerate() {
-            let off = now - stand;
-            // Written so that a NaN fails.
-            if !matches!(off.abs().partial_cmp(&self.settings.limits.stand), Some(o) if o.is_le()) {
-                return Err(Refusal::NotStanding { joint, off });
-            }
-        }
+        self.body.check_standing(sensors, self.settings.limits.stand)?;
         let planned = self.planner.plan(&self.body, &self.settings, &self.grid, request)?;
         let swing = planned.stroke.swing;
         let place = self.body.support_from_footprint(swing, request.ball).into();
@@ -429,35 +408,26 @@ impl KickEngine for AdaptiveKick {
         self.request = Some(*request);
         (self.candidate, self.search, self.broken_off) = (None, None, None);
         (self.lost, self.waited, self.clock) = (0.0, 0.0, 0.0);
-        self.status = KickStatus::Running;
-        self.hold = request.hold;
-        (self.cancel, self.caught, self.unaimed) = (false, false, false);
+        self.course = Course::started(request.hold);
+        (self.caught, self.unaimed) = (false, false);
         self.drive.start(&self.body, swing, &self.body.angles, self.settings.control_period, true);
         Ok(planned.plan)
     }
 
     fn release(&mut self) {
-        self.hold = false;
+        self.course.hold = false;
     }
 
     fn cancel(&mut self) {
-        self.cancel = true;
+        self.course.cancel();
     }
 
     fn progress(&self) -> Progress {
-        let end = self.motion.end();
-        let over = !self.running();
-        Progress {
-            status: self.status,
-            phase: if over { Phase::Stand } else { self.motion.phase(self.clock) },
-            done: if over || end <= 0.0 { 1.0 } else { (self.clock / end).clamp(0.0, 1.0) },
-            to_contact: self.motion.contact.filter(|_| !over).map(|contact| contact - self.clock),
-            foot: (!over).then_some(self.motion.swing),
-        }
+        self.course.progress(&self.motion.timeline, self.clock, self.motion.contact, self.motion.swing)
     }
 
     fn forecast(&self) -> Option<f64> {
-        self.stroke.filter(|_| self.running()).map(|stroke| stroke.forecast)
+        self.stroke.filter(|_| self.course.running()).map(|stroke| stroke.forecast)
     }
 
     fn broken_off(&self) -> Option<BreakOff> {

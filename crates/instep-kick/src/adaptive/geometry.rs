@@ -13,7 +13,7 @@ use nalgebra::{Vector2, Vector3};
 
 use crate::engine::Face;
 use crate::whole_body::body::Body;
-use crate::whole_body::foot::{FacePoint, Foot, contact_point};
+use crate::whole_body::foot::{FacePoint, Foot, contact_point, wrap};
 
 /// Which part of the foot strikes, and how the foot is turned.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -100,11 +100,6 @@ pub(crate) fn target(
 pub(crate) fn throw(off: f64, restitution: f64, friction: f64) -> f64 {
     let stick = 0.4 * off.clamp(-1.4, 1.4).tan() / (1.0 + restitution);
     stick.clamp(-friction, friction).atan()
-}
-
-/// Angle in (-pi, pi].
-pub(crate) fn wrap(angle: f64) -> f64 {
-    angle.sin().atan2(angle.cos())
 }
 
 /// A place or direction in the support sole's frame as the grid was measured: with the right foot swinging.

@@ -4,13 +4,14 @@
 use instep_motion::phase::Side;
 use nalgebra::{Vector2, Vector3};
 
-use crate::adaptive::geometry::{PARTS, Part, measured, possible, sphere, target, throw, wrap};
+use crate::adaptive::geometry::{PARTS, Part, measured, possible, sphere, target, throw};
 use crate::adaptive::grid::{CELL, Grid};
 use crate::adaptive::motion::{CORNERS, Stroke};
 use crate::adaptive::retraction::{Wanted, forecast};
 use crate::adaptive::settings::AdaptiveSettings;
 use crate::engine::Face;
 use crate::whole_body::body::Body;
+use crate::whole_body::foot::wrap;
 
 /// Rounds in which target and retraction settle on each other.
 const ROUNDS: usize = 2;

@@ -33,7 +33,7 @@ use crate::whole_body::torque::Dynamics;
 
 pub use engine::{AdaptiveKick, load_grid};
 pub use grid::Grid;
-pub use settings::{Accuracy, AdaptiveSettings, Kick, Stabiliser, Times};
+pub use settings::{Accuracy, AdaptiveSettings, Kick, Stabiliser};
 
 /// Weight of the swing foot's roll in inverse kinematics, 1/rad: a leg far to the side meets the limit of its ankle's roll, and
 /// the foot may lean rather than the body.

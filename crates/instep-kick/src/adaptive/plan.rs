@@ -8,31 +8,24 @@
 use instep_motion::phase::Side;
 use nalgebra::{Rotation3, Vector2, Vector3};
 
-use crate::adaptive::geometry::wrap;
 use crate::adaptive::grid::Grid;
 use crate::adaptive::lookup::{Found, Query, look_up_all};
-use crate::adaptive::motion::{Motion, Stroke, goals, trunk_support};
+use crate::adaptive::motion::{self, Stroke};
 use crate::adaptive::settings::AdaptiveSettings;
-use crate::engine::{Face, KickPlan, Phase};
-use crate::ik::{Ik, Residual};
-use crate::request::{KickRequest, Place, Refusal, Strength};
+use crate::engine::{Face, KickPlan};
+use crate::ik::Ik;
+use crate::request::{KickRequest, Place, Refusal};
 use crate::tree::TreePose;
 use crate::whole_body::body::Body;
+use crate::whole_body::foot::wrap;
+use crate::whole_body::forecast::{Demands, FAR, MIDDLE, Rehearsal, graver, ground_gap, judge, miss};
+use crate::whole_body::motion::{Motion, goals};
 use crate::whole_body::torque::Dynamics;
 
-/// Steps of inverse kinematics to a far place, to a near one, and along a way that is sampled densely.
-const FAR: usize = 12;
-const MIDDLE: usize = 6;
-const WAY: usize = 2;
 /// Strokes whose whole way is forecast.
 const FORECASTS: usize = 14;
 /// Cost of slowing a stroke down by its whole speed, or its retraction by its whole time.
 const SLOW_COST: f64 = 0.5;
-/// Time constant with which the planned centre of pressure is smoothed before it is held against the foot, s.
-const TIPPING: f64 = 0.04;
-/// Sampling of the forecast, s: in the strike, and elsewhere.
-const FINE: f64 = 0.016;
-const COARSE: f64 = 0.03;
 /// Share of the joints' speeds that retraction and way back may take: there is time, and a leg that swings freely overshoots.
 const CALM: f64 = 0.8;
 /// Least height of any point of the swing foot over the ground, m.
@@ -62,22 +55,11 @@ pub(crate) struct Planned {
     pub(crate) plan: KickPlan,
 }
 
-/// Scratch space of the planner.
+/// The planner of one robot.
 #[derive(Debug)]
 pub(crate) struct Planner {
-    ik: Ik,
-    pose: TreePose,
-    angles: Vec<f64>,
-    saved: Vec<f64>,
-    /// Joint angles with the left or right foot lifted over its place.
-    lifted: [Vec<f64>; 2],
-    dynamics: Dynamics,
+    pub(crate) rehearsal: Rehearsal,
     found: Vec<Found>,
-}
-
-/// Distance that a residual counts as, m: 1 rad is 0.1 m.
-fn miss(residual: &Residual) -> f64 {
-    residual.position + 0.1 * residual.orientation + 0.5 * residual.balance
 }
 
 /// The push that a ball (moving with `velocity`, m/s) needs to leave toward `direction` (rad) at `speed` (m/s).
@@ -87,25 +69,7 @@ pub(crate) fn push(direction: f64, speed: f64, velocity: Vector2<f64>) -> Vector
 
 impl Planner {
     pub(crate) fn new(body: &Body, settings: &AdaptiveSettings, ik: Ik, dynamics: Dynamics) -> Self {
-        let mut planner = Self {
-            ik,
-            pose: body.tree.pose(),
-            angles: body.angles.clone(),
-            saved: body.angles.clone(),
-            lifted: [body.angles.clone(), body.angles.clone()],
-            dynamics,
-            found: Vec::new(),
-        };
-        for swing in [Side::Left, Side::Right] {
-            planner.angles.copy_from_slice(&body.angles);
-            body.set_arms(1.0, &mut planner.angles);
-            let home = body.stand(swing).home;
-            let goals =
-                goals(&[home.x, home.y, settings.kick.lift, 0.0, 0.0], &trunk_support(body, settings, swing, 0.0));
-            planner.ik.solve(&body.tree, &mut planner.pose, &mut planner.angles, swing, &goals, 30);
-            planner.lifted[swing as usize].copy_from_slice(&planner.angles);
-        }
-        planner
+        Self { rehearsal: Rehearsal::new(body, &settings.manner(), ik, dynamics), found: Vec::new() }
     }
 
     /// Plans `request`.
@@ -153,7 +117,7 @@ impl Planner {
         let mut best: Option<(Planned, f64)> = None;
         let mut refusal = None;
         let mut good = 0;
-        for i in 0..=(t.wait / WAIT_STEP) as usize {
+        for i in 0..=(settings.kick.wait / WAIT_STEP) as usize {
             let at = soonest + i as f64 * WAIT_STEP;
             let ball = body.ball.roll(request.ball, request.ball_velocity, at);
             match self.plan_at(body, settings, grid, request, ball, at) {
@@ -188,11 +152,7 @@ impl Planner {
     ) -> Result<(Planned, f64), Refusal> {
         let mut found = std::mem::take(&mut self.found);
         found.clear();
-        let wanted = match request.strength {
-            Strength::BallSpeed(v) => v,
-            Strength::FootSpeed(v) => v * body.ball.gain(1.0),
-            Strength::Distance(d) => (2.0 * body.ball.deceleration * d).sqrt(),
-        };
+        let wanted = request.strength.ball_speed(&body.ball, 1.0);
         let aim = push(request.direction, wanted, velocity.into());
         for swing in [Side::Left, Side::Right] {
             if request.foot.is_some_and(|foot| foot != swing) {
@@ -263,7 +223,7 @@ impl Planner {
             foot: stroke.swing,
             face: stroke.face,
             contact: motion.contact.unwrap_or(0.0),
-            duration: motion.end(),
+            duration: motion.timeline.end(),
             foot_speed: stroke.speed,
             ball_speed: comes.norm(),
             precision: precision(settings, stroke),
@@ -279,20 +239,17 @@ impl Planner {
         stroke: &mut Stroke,
         (request, velocity): (&KickRequest, [f64; 2]),
     ) -> Result<(f64, f64), Refusal> {
-        self.angles.copy_from_slice(&self.lifted[stroke.swing as usize]);
+        self.rehearsal.lift(stroke.swing);
         self.reach(body, settings, stroke, &stroke.contact, Place::Contact, FAR)?;
-        self.saved.copy_from_slice(&self.angles);
-        self.dynamics.fill(body, stroke.swing.other(), &self.angles, &self.pose);
+        let tried = &mut self.rehearsal;
+        tried.saved.copy_from_slice(&tried.angles);
+        tried.dynamics.fill(body, stroke.swing.other(), &tried.angles, &tried.pose);
         let toward = Vector3::new(stroke.normal.cos(), stroke.normal.sin(), 0.0);
         let foot = &body.feet[stroke.swing as usize];
         let point = stroke.part.meet(foot, stroke.normal, f64::INFINITY).map_or(foot.faces[0], |(_, point)| point);
         let strike = stroke.contact + Rotation3::from_axis_angle(&Vector3::z_axis(), stroke.yaw) * point.axis;
-        let mass = self.dynamics.effective_mass(body.robot.leg(stroke.swing).foot, &strike, &toward);
-        let ball_speed = match request.strength {
-            Strength::BallSpeed(v) => v,
-            Strength::FootSpeed(v) => v * body.ball.gain(mass),
-            Strength::Distance(d) => (2.0 * body.ball.deceleration * d).sqrt(),
-        };
+        let mass = tried.dynamics.effective_mass(body.robot.leg(stroke.swing).foot, &strike, &toward);
+        let ball_speed = request.strength.ball_speed(&body.ball, mass);
         let change = push(request.direction, ball_speed, velocity.into()).norm();
         let along = Vector2::from(velocity).dot(&toward.xy());
         // Only the part of the foot's speed along the push drives the ball.
@@ -304,7 +261,7 @@ impl Planner {
         let most = stroke.follow;
         for share in [1.0, 0.6, 0.3] {
             stroke.follow = share * most;
-            self.angles.copy_from_slice(&self.saved);
+            self.rehearsal.angles.copy_from_slice(&self.rehearsal.saved);
             match self.reach(body, settings, stroke, &stroke.rest(), Place::FollowThrough, MIDDLE) {
                 Ok(()) => return Ok((foot_speed, ball_speed)),
                 Err(cause) => failure = Some(cause),
@@ -322,8 +279,15 @@ impl Planner {
         (needed, _): (f64, f64),
     ) -> Result<Motion, Refusal> {
         loop {
-            let motion = Motion::kick(body, settings, stroke);
-            match self.forecast(body, settings, &motion, stroke) {
+            let motion = motion::kick(body, settings, stroke);
+            let demands = Demands {
+                limits: &settings.limits,
+                foot_speed: stroke.speed,
+                calm: [[CALM, 1.0]; 2],
+                roll: 0.0,
+                ground: GROUND,
+            };
+            match self.rehearsal.forecast(body, &motion, &demands) {
                 Ok(()) => return Ok(motion),
                 Err((cause, false)) => {
                     if stroke.pace * PACE > SLOWEST || !matches!(cause, Refusal::TooFast { .. }) {
@@ -352,108 +316,8 @@ impl Planner {
         what: Place,
         steps: usize,
     ) -> Result<(), Refusal> {
-        check(body, settings, (&mut self.ik, &mut self.pose, &mut self.angles), stroke, place, what, steps)
-    }
-
-    /// Follows a motion from the retraction to the way back; with a refusal, whether it is the strike's.
-    fn forecast(
-        &mut self,
-        body: &Body,
-        settings: &AdaptiveSettings,
-        motion: &Motion,
-        stroke: &Stroke,
-    ) -> Result<(), (Refusal, bool)> {
-        let swing = stroke.swing;
-        let support = swing.other();
-        let limits = &settings.limits;
-        self.angles.copy_from_slice(&self.lifted[swing as usize]);
-        let (start, end) = (motion.end_of(Phase::Raise), motion.end_of(Phase::MoveBack));
-        let contact = motion.contact.unwrap_or(end);
-        let fast = [motion.end_of(Phase::WindUp) - 2.0 * FINE, motion.end_of(Phase::Kick) + FINE];
-        let foot = &body.feet[support as usize];
-        let mut time = start;
-        let mut fine = 0;
-        let mut zmp = [0.0; 2];
-        let mut last: Option<f64> = None;
-        while time < end {
-            let quick = (fast[0]..fast[1]).contains(&time);
-            let goals = motion.goals(time);
-            let residual = self.ik.solve(&body.tree, &mut self.pose, &mut self.angles, swing, &goals, WAY);
-            let gap = miss(&residual);
-            if !matches!(gap.partial_cmp(&limits.reach), Some(o) if o.is_le()) {
-                return Err((Refusal::Unreachable { foot: swing, place: Place::Way, gap }, quick));
-            }
-            let (gap, pair) = body.tree.least_gap(&self.pose);
-            if gap < limits.clearance {
-                return Err((Refusal::SelfCollision { foot: swing, pair, gap }, quick));
-            }
-            let gap = ground_gap(body, &self.pose, swing);
-            if gap < GROUND {
-                return Err((Refusal::HitsGround { foot: swing, gap }, quick));
-            }
-            if quick {
-                if fine == 0 {
-                    self.dynamics.fill(body, support, &self.angles, &self.pose);
-                } else {
-                    self.dynamics.push(body, support, &self.angles, &self.pose);
-                }
-                fine += 1;
-            }
-            // Between the samples no joint may jump from one solution to another.
-            if let Some(last) = last {
-                let most = self
-                    .ik
-                    .joints()
-                    .map(|j| ((self.angles[j] - self.saved[j]).abs() / (time - last) / body.robot.joints[j].speed, j));
-                let (share, joint) = most.fold((0.0, 0), |a, b| if b.0 > a.0 { b } else { a });
-                if share > limits.speed * if quick { 1.0 } else { CALM } {
-                    return Err((Refusal::TooFast { foot: swing, asked: stroke.speed, share, joint }, quick));
-                }
-            }
-            self.saved.copy_from_slice(&self.angles);
-            last = Some(time);
-            if !quick {
-                self.dynamics.fill(body, support, &self.angles, &self.pose);
-                self.dynamics.solve(body, swing, &self.pose, FINE, false);
-                let [_, (share, joint)] = self.dynamics.shares(&body.robot);
-                if share > limits.hold {
-                    return Err((Refusal::TooHeavy { foot: swing, share, joint }, quick));
-                }
-            }
-            if quick && fine >= 3 {
-                // The pose is one sample ahead of the middle: good enough for axes of a forecast.
-                let now = self.dynamics.solve(body, swing, &self.pose, FINE, false);
-                // To tip takes about sqrt(h / g): what is over sooner does not count in full.
-                let share = if fine == 3 { 1.0 } else { FINE / (TIPPING + FINE) };
-                zmp = [0, 1].map(|k| zmp[k] + share * (now[k] - zmp[k]));
-                let [(speed, fastest), (torque, strongest)] = self.dynamics.shares(&body.robot);
-                // After the contact a joint may lag: nothing depends on it.
-                if time <= contact + FINE {
-                    for (share, most, joint) in [(speed, limits.speed, fastest), (torque, limits.torque, strongest)] {
-                        if share > most {
-                            return Err((Refusal::TooFast { foot: swing, asked: stroke.speed, share, joint }, quick));
-                        }
-                    }
-                }
-                let by = [(zmp[0], foot.stand_x), (zmp[1], foot.stand_y)]
-                    .map(|(p, [low, high])| (low + limits.edge - p).max(p - high + limits.edge))
-                    .into_iter()
-                    .fold(f64::NEG_INFINITY, f64::max);
-                if by > 0.0 {
-                    return Err((Refusal::OffBalance { foot: swing, by }, quick));
-                }
-            }
-            time += if quick { FINE } else { COARSE.min((fast[0] - time).max(FINE)) };
-        }
-        Ok(())
-    }
-
-    /// The largest share of a motor's torque that holding the pose with `angles` takes, and its joint.
-    pub(crate) fn load(&mut self, body: &Body, swing: Side, angles: &[f64], pose: &TreePose) -> (f64, usize) {
-        self.dynamics.fill(body, swing.other(), angles, pose);
-        self.dynamics.solve(body, swing, pose, FINE, false);
-        let [_, torque] = self.dynamics.shares(&body.robot);
-        torque
+        let Rehearsal { ik, pose, angles, .. } = &mut self.rehearsal;
+        check(body, settings, (ik, pose, angles), stroke, place, what, steps)
     }
 
     /// The request nearest to `request` that can be kicked: its ball (m) and direction (rad).
@@ -502,32 +366,15 @@ pub(crate) fn check(
     what: Place,
     steps: usize,
 ) -> Result<(), Refusal> {
-    let trunk = trunk_support(body, settings, stroke.swing, stroke.yaw);
+    let trunk = settings.manner().trunk_support(body, stroke.swing, stroke.yaw);
     let goals = goals(&stroke.pose(place), &trunk);
-    let residual = ik.solve(&body.tree, pose, angles, stroke.swing, &goals, steps);
-    let gap = miss(&residual);
-    // Written so that a NaN fails.
-    if !matches!(gap.partial_cmp(&settings.limits.reach), Some(o) if o.is_le()) {
-        return Err(Refusal::Unreachable { foot: stroke.swing, place: what, gap });
-    }
-    let (gap, pair) = body.tree.least_gap(pose);
-    if gap < settings.limits.clearance {
-        return Err(Refusal::SelfCollision { foot: stroke.swing, pair, gap });
-    }
+    let off = ik.solve(&body.tree, pose, angles, stroke.swing, &goals, steps);
+    judge(body, &settings.limits, pose, stroke.swing, what, miss(&off, 0.0))?;
     let gap = ground_gap(body, pose, stroke.swing);
     if gap < GROUND {
         return Err(Refusal::HitsGround { foot: stroke.swing, gap });
     }
     Ok(())
-}
-
-/// Height of the swing foot's lowest point over the support sole's plane, m.
-fn ground_gap(body: &Body, pose: &TreePose, swing: Side) -> f64 {
-    let sole = &body.robot.leg(swing.other()).sole;
-    let up = pose.rotation[sole.link] * Vector3::z();
-    let origin = pose.point(sole);
-    let points = body.robot.contacts.iter().filter(|contact| contact.leg == swing);
-    points.map(|contact| up.dot(&(pose.point(&contact.at) - origin)) - contact.radius).fold(f64::INFINITY, f64::min)
 }
 
 /// Stated standard deviation of the direction, rad.
@@ -539,20 +386,4 @@ pub(crate) fn precision(settings: &AdaptiveSettings, stroke: &Stroke) -> f64 {
         Face::Corner => a.corner,
     };
     least + a.angle * stroke.forecast.clamp(-1.0, 1.0).acos()
-}
-
-/// The refusal that tells more: what came nearest to being possible.
-fn graver(old: Option<Refusal>, new: Refusal) -> Refusal {
-    let rank = |r: &Refusal| match r {
-        Refusal::Unreachable { place: Place::Contact, gap, .. } => -gap.min(10.0),
-        Refusal::Unreachable { gap, .. } => 1.0 - gap.min(0.9),
-        Refusal::SelfCollision { .. } | Refusal::HitsGround { .. } => 2.0,
-        Refusal::OffBalance { .. } | Refusal::TooHeavy { .. } => 3.0,
-        Refusal::TooFast { share, .. } => 5.0 - (share / 100.0).min(0.9),
-        _ => 9.0,
-    };
-    match old {
-        Some(old) if rank(&old) >= rank(&new) => old,
-        _ => new,
-    }
 }

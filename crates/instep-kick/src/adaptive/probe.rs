@@ -14,7 +14,6 @@ use nalgebra::{Quaternion, Rotation3, UnitQuaternion, Vector3};
 
 use crate::KickError;
 use crate::adaptive::grid::{CELL, CELLS, Cell, Grid};
-use crate::adaptive::motion::{goals, trunk_support};
 use crate::adaptive::settings::AdaptiveSettings;
 use crate::ball::BallModel;
 use crate::ik::Ik;
@@ -22,6 +21,7 @@ use crate::settings::Settings;
 use crate::tree::TreePose;
 use crate::whole_body::body::Body;
 use crate::whole_body::drive::{Drive, Footing, Wanted};
+use crate::whole_body::motion::goals;
 use crate::whole_body::path::Path;
 
 /// A probe plays no ball.
@@ -100,7 +100,7 @@ impl Probe {
 
     /// Moves `self.angles` toward a foot at `point`; whether joint ranges, gaps and balance allow it.
     fn reach(&mut self, point: &Vector3<f64>, steps: usize) -> bool {
-        let trunk = trunk_support(&self.body, &self.settings, SWING, 0.0);
+        let trunk = self.settings.manner().trunk_support(&self.body, SWING, 0.0);
         let goals = goals(&Self::pose_at(point), &trunk);
         let off = self.ik.solve(&self.body.tree, &mut self.pose, &mut self.angles, SWING, &goals, steps);
         off.position < 0.5 * CELL
@@ -220,7 +220,7 @@ impl Probe {
 impl Controller for Probe {
     fn tick(&mut self, sensors: &Sensors, command: &mut JointCommand) {
         let dt = self.settings.control_period;
-        let trunk = trunk_support(&self.body, &self.settings, SWING, 0.0);
+        let trunk = self.settings.manner().trunk_support(&self.body, SWING, 0.0);
         let wanted = Wanted { goals: goals(&self.foot.at(self.clock + 1.5 * dt).position, &trunk), arms: 1.0 };
         let footing = Footing { swing: SWING, both: false, active: true };
         self.drive.tick(&self.body, footing, &wanted, dt, sensors, command);

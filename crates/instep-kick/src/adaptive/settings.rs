@@ -7,7 +7,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::KickError;
 use crate::settings::{Settings, within};
-use crate::whole_body::{Feedback, Inclination, Limits, Stance};
+use crate::whole_body::motion::Manner;
+use crate::whole_body::{Feedback, Inclination, Limits, Stance, Times};
 
 /// All numbers of the engine for one robot.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -80,28 +81,8 @@ pub struct Kick {
     pub speed_gain: f64,
     /// Share of the asked speed below which a kick is refused; above it the plan says what speed comes.
     pub speed_least: f64,
-}
-
-/// How long phases take; the strike's time follows from distance and speed.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Times {
-    /// Shift of the weight over the support foot, s.
-    pub shift: f64,
-    /// Pause on the support foot before the foot is raised, s.
-    pub settle: f64,
-    /// Fastest mean speed of the foot outside the strike, m/s.
-    pub foot_speed: f64,
-    /// Least time of a foot motion outside the strike, s.
-    pub foot_least: f64,
-    /// Pause at the retraction point, s.
-    pub aim: f64,
     /// Longest wait at the retraction point for a ball that is on its way, s.
     pub wait: f64,
-    /// Lowering of the foot, s.
-    pub lower: f64,
-    /// Shift of the weight back, s.
-    pub shift_back: f64,
 }
 
 /// What the forecast g says of the direction: the stated standard deviation is base + angle * acos(g), rad. Measured
@@ -119,12 +100,20 @@ pub struct Accuracy {
     pub angle: f64,
 }
 
+impl AdaptiveSettings {
+    /// What the motion takes from them.
+    pub(crate) fn manner(&self) -> Manner<'_> {
+        let (kick, times, stance) = (&self.kick, &self.times, &self.stance);
+        Manner { times, stance, lift: kick.lift, follow: kick.follow, base_yaw: kick.base_yaw }
+    }
+}
+
 impl Settings for AdaptiveSettings {
     const FILE: &'static str = "adaptive.toml";
     const HOLDS: &'static str = "the adaptive engine's settings";
 
     fn validate(&self) -> Result<(), KickError> {
-        let (k, t, a) = (&self.kick, &self.times, &self.accuracy);
+        let (k, a) = (&self.kick, &self.accuracy);
         for (field, value, low, high) in [
             ("control_period", self.control_period, 0.001, 0.02),
             ("kick.delta", k.delta, 0.0, 1.0),
@@ -139,15 +128,8 @@ impl Settings for AdaptiveSettings {
             ("kick.friction", k.friction, 0.0, 2.0),
             ("kick.forecast_least", k.forecast_least, -1.0, 1.0),
             ("kick.speed_gain", k.speed_gain, 0.3, 3.0),
+            ("kick.wait", k.wait, 0.0, 60.0),
             ("kick.speed_least", k.speed_least, 0.0, 1.0),
-            ("times.shift", t.shift, 0.1, 5.0),
-            ("times.settle", t.settle, 0.0, 5.0),
-            ("times.foot_speed", t.foot_speed, 0.01, 5.0),
-            ("times.foot_least", t.foot_least, 0.02, 5.0),
-            ("times.aim", t.aim, 0.0, 5.0),
-            ("times.wait", t.wait, 0.0, 60.0),
-            ("times.lower", t.lower, 0.02, 5.0),
-            ("times.shift_back", t.shift_back, 0.1, 5.0),
             ("accuracy.front", a.front, 0.0, 3.2),
             ("accuracy.side", a.side, 0.0, 3.2),
             ("accuracy.corner", a.corner, 0.0, 3.2),
@@ -155,6 +137,7 @@ impl Settings for AdaptiveSettings {
         ] {
             within(field, value, low, high)?;
         }
+        self.times.validate()?;
         self.stance.validate()?;
         self.limits.validate()?;
         self.inclination.validate()?;

@@ -5,7 +5,7 @@
 //! tick, so that no tick takes long; if all are within reach, the kick goes on to the new place. If not, it goes on to
 //! the old one. Only balls that were planned as resting are followed; a rolling one was forecast by the plan.
 
-use nalgebra::{Rotation2, Vector2};
+use nalgebra::Vector2;
 
 use crate::dynamic::motion::Stroke;
 
@@ -35,10 +35,8 @@ impl Follow {
         Self { seen: None, last: f64::NEG_INFINITY, target, candidate: None, tried: 0 }
     }
 
-    /// Takes one sight: `ball` relative to the base's ground projection in its heading; `base` and `yaw` are that
-    /// projection and heading in the support sole's frame.
-    pub(crate) fn see(&mut self, time: f64, ball: [f64; 2], base: Vector2<f64>, yaw: f64) {
-        let at = base + Rotation2::new(yaw) * Vector2::from(ball);
+    /// Takes one sight: the ball in the support sole's frame, m.
+    pub(crate) fn see(&mut self, time: f64, at: Vector2<f64>) {
         // NaN and sights seen before are left out.
         if !(at.x + at.y).is_finite() || !matches!(time.partial_cmp(&self.last), Some(o) if o.is_gt()) {
             return;

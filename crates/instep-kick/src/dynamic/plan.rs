@@ -11,30 +11,19 @@ use std::f64::consts::FRAC_PI_4;
 use instep_motion::phase::Side;
 use nalgebra::{Vector2, Vector3};
 
-use crate::dynamic::body::Body;
-use crate::dynamic::foot::{FacePoint, contact_point, paper_choice, paper_face};
-use crate::dynamic::motion::{Motion, Stroke, goals, trunk_support};
+use crate::dynamic::motion::{self, Stroke};
 use crate::dynamic::settings::DynamicSettings;
-use crate::dynamic::torque::Dynamics;
-use crate::engine::{Face, KickPlan, Phase};
-use crate::ik::{Ik, Residual};
-use crate::request::{KickRequest, Place, Refusal, Strength};
-use crate::tree::TreePose;
+use crate::engine::{Face, KickPlan};
+use crate::ik::Ik;
+use crate::request::{KickRequest, Place, Refusal};
+use crate::whole_body::body::Body;
+use crate::whole_body::foot::{FacePoint, contact_point, paper_choice, paper_face, wrap};
+use crate::whole_body::forecast::{Demands, FAR, MIDDLE, NEAR, ROLL, Rehearsal, check_place, fastest, graver, judge};
+use crate::whole_body::motion::{Motion, goals};
+use crate::whole_body::torque::Dynamics;
 
-/// Steps of inverse kinematics to a place that is far from the last.
-const FAR: usize = 12;
-/// The same to a place a hand's breadth away.
-const MIDDLE: usize = 6;
-/// The same to a place near the last.
-const NEAR: usize = 3;
-/// The same along a way that is sampled densely.
-const WAY: usize = 2;
-/// Time constant with which the planned centre of pressure is smoothed before it is held against the foot, s.
-const TIPPING: f64 = 0.04;
-/// Sampling of the forecast, s: in the kick, and elsewhere.
-const FINE: f64 = 0.016;
-const COARSE: f64 = 0.03;
-
+/// Speeds of joints after the contact, in units of their limits, up to which they come back in time.
+const LATE: f64 = 1.5;
 /// Least and greatest angle from the foot's x axis at which a corner strikes, rad.
 const CORNER: [f64; 2] = [0.0, 1.3];
 
@@ -87,48 +76,15 @@ pub(crate) struct Planned {
     pub(crate) plan: KickPlan,
 }
 
-/// Scratch space of the planner.
+/// The planner of one robot.
 #[derive(Debug)]
 pub(crate) struct Planner {
-    ik: Ik,
-    pose: TreePose,
-    angles: Vec<f64>,
-    saved: Vec<f64>,
-    /// Joint angles with the left or right foot lifted over its place.
-    lifted: [Vec<f64>; 2],
-    dynamics: Dynamics,
-}
-
-/// Distance that a residual counts as, m: 1 rad is 0.1 m.
-pub(crate) fn miss(residual: &Residual) -> f64 {
-    residual.position + 0.1 * residual.orientation + 0.03 * residual.roll + 0.5 * residual.balance
-}
-
-/// Angle in (-pi, pi].
-fn wrap(angle: f64) -> f64 {
-    angle.sin().atan2(angle.cos())
+    rehearsal: Rehearsal,
 }
 
 impl Planner {
     pub(crate) fn new(body: &Body, settings: &DynamicSettings, ik: Ik, dynamics: Dynamics) -> Self {
-        let mut planner = Self {
-            ik,
-            pose: body.tree.pose(),
-            angles: body.angles.clone(),
-            saved: body.angles.clone(),
-            lifted: [body.angles.clone(), body.angles.clone()],
-            dynamics,
-        };
-        for swing in [Side::Left, Side::Right] {
-            planner.angles.copy_from_slice(&body.angles);
-            body.set_arms(1.0, &mut planner.angles);
-            let home = body.stand(swing).home;
-            let foot = [home.x, home.y, settings.swing.lift, 0.0, 0.0];
-            let goals = goals(&foot, &trunk_support(body, settings, swing, 0.0));
-            planner.ik.solve(&body.tree, &mut planner.pose, &mut planner.angles, swing, &goals, 30);
-            planner.lifted[swing as usize].copy_from_slice(&planner.angles);
-        }
-        planner
+        Self { rehearsal: Rehearsal::new(body, &settings.manner(), ik, dynamics) }
     }
 
     /// Plans `request`.
@@ -170,7 +126,7 @@ impl Planner {
         whole: bool,
     ) -> Result<Planned, Refusal> {
         let (ball, velocity) = body.ball.roll(request.ball, request.ball_velocity, time);
-        check_place(body, ball)?;
+        check_place(body, ball, false)?;
         let mut refusal: Option<Refusal> = None;
         // What each would cost at least, cheapest first: once two are cheaper than all that are left, none of those can
         // be one of the two best.
@@ -196,8 +152,19 @@ impl Planner {
         }
         // The two best are enough: what neither can do, the sixth will not.
         for candidate in candidates.iter().flatten() {
-            let motion = Motion::kick(body, settings, &candidate.stroke);
-            let forecast = if whole { self.forecast(body, settings, &motion, &candidate.stroke) } else { Ok(()) };
+            let motion = motion::kick(body, settings, &candidate.stroke);
+            let demands = Demands {
+                limits: &settings.limits,
+                foot_speed: candidate.stroke.speed,
+                calm: [[1.0; 2], [LATE; 2]],
+                roll: ROLL,
+                ground: f64::NEG_INFINITY,
+            };
+            let forecast = if whole {
+                self.rehearsal.forecast(body, &motion, &demands).map_err(|(cause, _)| cause)
+            } else {
+                Ok(())
+            };
             match forecast {
                 Ok(()) => {
                     let front = candidate.stroke.face == Face::Front;
@@ -205,7 +172,7 @@ impl Planner {
                         foot: candidate.stroke.swing,
                         face: candidate.stroke.face,
                         contact: motion.contact.unwrap_or(0.0),
-                        duration: motion.end(),
+                        duration: motion.timeline.end(),
                         foot_speed: candidate.stroke.speed,
                         ball_speed: candidate.ball_speed,
                         precision: if front { settings.accuracy.front } else { settings.accuracy.side },
@@ -231,7 +198,7 @@ impl Planner {
         let s = &settings.swing;
         // A moving ball keeps its speed: the impulse must point from it to the wanted velocity.
         let ball_velocity = Vector2::from(velocity);
-        let wanted = unit(request.direction) * wanted_speed(body, request, 1.0) - ball_velocity;
+        let wanted = unit(request.direction) * request.strength.ball_speed(&body.ball, 1.0) - ball_velocity;
         let direction = if ball_velocity.norm() > 0.02 { wanted.y.atan2(wanted.x) } else { request.direction };
         let (point, yaw) = if face == Face::Corner {
             let yaw = turn * direction;
@@ -290,29 +257,26 @@ impl Planner {
         };
 
         // Contact first: where it is out of reach, nothing else matters.
-        self.angles.copy_from_slice(&self.lifted[swing as usize]);
+        self.rehearsal.lift(swing);
         self.reach(body, settings, &stroke, stroke.pose(0.0), Place::Contact, FAR)?;
-        self.saved.copy_from_slice(&self.angles);
-        let limit = self.limit_margin(body);
+        let tried = &mut self.rehearsal;
+        tried.saved.copy_from_slice(&tried.angles);
+        let limit = tried.limit_margin(body);
 
         // Effective mass, foot speed, and the share of the joints' speeds that it takes.
-        self.dynamics.fill(body, swing.other(), &self.angles, &self.pose);
+        tried.dynamics.fill(body, swing.other(), &tried.angles, &tried.pose);
         let toward = Vector3::new(direction.cos(), direction.sin(), 0.0);
         let strike = contact + nalgebra::Rotation3::from_axis_angle(&Vector3::z_axis(), yaw) * point.axis;
-        let mass = self.dynamics.effective_mass(body.robot.leg(swing).foot, &strike, &toward);
-        let ball_speed = wanted_speed(body, request, mass);
+        let mass = tried.dynamics.effective_mass(body.robot.leg(swing).foot, &strike, &toward);
+        let ball_speed = request.strength.ball_speed(&body.ball, mass);
         let change = (unit(request.direction) * ball_speed - ball_velocity).norm();
         let along = ball_velocity.dot(&toward.xy());
         stroke.speed = (change / body.ball.gain(mass) * s.speed_gain + along).max(0.1);
         let ahead = 0.01;
         let beyond = self.reach(body, settings, &stroke, stroke.pose(ahead), Place::Contact, NEAR);
-        let share = body
-            .robot
-            .joints
-            .iter()
-            .enumerate()
-            .map(|(j, joint)| ((self.angles[j] - self.saved[j]) / ahead * stroke.speed / joint.speed, j))
-            .fold((0.0_f64, 0), |most, (share, j)| if share.abs() > most.0 { (share.abs(), j) } else { most });
+        let tried = &self.rehearsal;
+        let time = ahead / stroke.speed;
+        let share = fastest(&body.robot, 0..body.robot.joints.len(), &tried.saved, &tried.angles, time);
         if beyond.is_ok() && share.0 > settings.limits.speed {
             return Err(Refusal::TooFast { foot: swing, asked: stroke.speed, share: share.0, joint: share.1 });
         }
@@ -321,7 +285,7 @@ impl Planner {
         let mut failure = None;
         let fits = [1.0, 0.65, 0.3, 0.0].into_iter().find_map(|share| {
             stroke.windup = s.windup_least + share * (s.windup - s.windup_least);
-            self.angles.copy_from_slice(&self.saved);
+            self.rehearsal.angles.copy_from_slice(&self.rehearsal.saved);
             let place = stroke.windup_pose();
             self.reach(body, settings, &stroke, place, Place::WindUp, MIDDLE).map_err(|e| failure = Some(e)).ok()
         });
@@ -330,7 +294,7 @@ impl Planner {
         }
         let fits = [1.0, 0.5, 0.0].into_iter().find_map(|share| {
             stroke.follow = s.follow * (0.3 + 0.7 * share);
-            self.angles.copy_from_slice(&self.saved);
+            self.rehearsal.angles.copy_from_slice(&self.rehearsal.saved);
             let place = stroke.follow_pose();
             self.reach(body, settings, &stroke, place, Place::FollowThrough, MIDDLE).map_err(|e| failure = Some(e)).ok()
         });
@@ -344,7 +308,7 @@ impl Planner {
         Ok(Candidate { stroke, cost, ball_speed })
     }
 
-    /// Moves the foot to `place` by inverse kinematics and judges the pose.
+    /// Moves the foot to `foot` by inverse kinematics and judges the pose.
     fn reach(
         &mut self,
         body: &Body,
@@ -354,177 +318,12 @@ impl Planner {
         what: Place,
         steps: usize,
     ) -> Result<(), Refusal> {
-        let trunk = trunk_support(body, settings, stroke.swing, stroke.yaw);
-        let goals = goals(&foot, &trunk);
-        let residual = self.ik.solve(&body.tree, &mut self.pose, &mut self.angles, stroke.swing, &goals, steps);
-        let gap = miss(&residual);
-        // Written so that a NaN fails.
-        if !matches!(gap.partial_cmp(&settings.limits.reach), Some(o) if o.is_le()) {
-            return Err(Refusal::Unreachable { foot: stroke.swing, place: what, gap });
-        }
-        let (gap, pair) = body.tree.least_gap(&self.pose);
-        if gap < settings.limits.clearance {
-            return Err(Refusal::SelfCollision { foot: stroke.swing, pair, gap });
-        }
-        Ok(())
-    }
-
-    /// Distance of the present angles from the nearest joint limit, rad.
-    fn limit_margin(&self, body: &Body) -> f64 {
-        self.ik
-            .joints()
-            .map(|j| {
-                let [low, high] = body.robot.joints[j].range;
-                (self.angles[j] - low).min(high - self.angles[j])
-            })
-            .fold(f64::INFINITY, f64::min)
-    }
-
-    /// Follows a whole motion.
-    pub(crate) fn forecast(
-        &mut self,
-        body: &Body,
-        settings: &DynamicSettings,
-        motion: &Motion,
-        stroke: &Stroke,
-    ) -> Result<(), Refusal> {
-        let swing = stroke.swing;
-        let support = swing.other();
-        let limits = &settings.limits;
-        self.angles.copy_from_slice(&self.lifted[swing as usize]);
-        let (start, end) = (motion.end_of(Phase::Raise), motion.end_of(Phase::MoveBack));
-        let contact = motion.contact.unwrap_or(end);
-        let fast = [motion.end_of(Phase::WindUp) - 2.0 * FINE, motion.end_of(Phase::Kick) + FINE];
-        let foot = &body.feet[support as usize];
-        let mut time = start;
-        let mut fine = 0;
-        let mut zmp = [0.0; 2];
-        let mut last: Option<f64> = None;
-        while time < end {
-            let goals = motion.goals(time);
-            let residual = self.ik.solve(&body.tree, &mut self.pose, &mut self.angles, swing, &goals, WAY);
-            let gap = miss(&residual);
-            if !matches!(gap.partial_cmp(&limits.reach), Some(o) if o.is_le()) {
-                return Err(Refusal::Unreachable { foot: swing, place: Place::Way, gap });
-            }
-            let (gap, pair) = body.tree.least_gap(&self.pose);
-            if gap < limits.clearance {
-                return Err(Refusal::SelfCollision { foot: swing, pair, gap });
-            }
-            let quick = (fast[0]..fast[1]).contains(&time);
-            if quick {
-                if fine == 0 {
-                    self.dynamics.fill(body, support, &self.angles, &self.pose);
-                } else {
-                    self.dynamics.push(body, support, &self.angles, &self.pose);
-                }
-                fine += 1;
-            }
-            // Between the samples, in the slow parts too, no joint may jump from one solution to another.
-            if let Some(last) = last {
-                let most = self
-                    .ik
-                    .joints()
-                    .map(|j| ((self.angles[j] - self.saved[j]).abs() / (time - last) / body.robot.joints[j].speed, j));
-                let (share, joint) = most.fold((0.0, 0), |a, b| if b.0 > a.0 { b } else { a });
-                if time <= contact && share > limits.speed || share > 1.5 * limits.speed {
-                    return Err(Refusal::TooFast { foot: swing, asked: stroke.speed, share, joint });
-                }
-            }
-            self.saved.copy_from_slice(&self.angles);
-            last = Some(time);
-            if !quick {
-                self.dynamics.fill(body, support, &self.angles, &self.pose);
-                self.dynamics.solve(body, swing, &self.pose, FINE, false);
-                let [_, (share, joint)] = self.dynamics.shares(&body.robot);
-                if share > limits.hold {
-                    return Err(Refusal::TooHeavy { foot: swing, share, joint });
-                }
-            }
-            if quick && fine >= 3 {
-                // The pose is one sample ahead of the middle: good enough for axes of a forecast.
-                let now = self.dynamics.solve(body, swing, &self.pose, FINE, false);
-                // To tip takes about sqrt(h / g): what is over sooner does not count in full.
-                let share = if fine == 3 { 1.0 } else { FINE / (TIPPING + FINE) };
-                zmp = [0, 1].map(|k| zmp[k] + share * (now[k] - zmp[k]));
-                let [(speed, fastest), (torque, strongest)] = self.dynamics.shares(&body.robot);
-                // After the contact a joint may lag: nothing depends on it.
-                if time <= contact + FINE {
-                    if speed > limits.speed {
-                        let cause = Refusal::TooFast { foot: swing, asked: stroke.speed, share: speed, joint: fastest };
-                        return Err(cause);
-                    }
-                    if torque > limits.torque {
-                        let cause =
-                            Refusal::TooFast { foot: swing, asked: stroke.speed, share: torque, joint: strongest };
-                        return Err(cause);
-                    }
-                }
-                let by = [(zmp[0], foot.stand_x), (zmp[1], foot.stand_y)]
-                    .map(|(p, [low, high])| (low + limits.edge - p).max(p - high + limits.edge))
-                    .into_iter()
-                    .fold(f64::NEG_INFINITY, f64::max);
-                if by > 0.0 {
-                    return Err(Refusal::OffBalance { foot: swing, by });
-                }
-            }
-            time += if quick { FINE } else { COARSE.min((fast[0] - time).max(FINE)) };
-            if !quick && time >= fast[1] {
-                time = time.max(fast[1]);
-            }
-        }
-        Ok(())
+        let trunk = settings.manner().trunk_support(body, stroke.swing, stroke.yaw);
+        let gap = self.rehearsal.go(body, stroke.swing, &goals(&foot, &trunk), steps, ROLL);
+        judge(body, &settings.limits, &self.rehearsal.pose, stroke.swing, what, gap)
     }
 }
 
 fn unit(angle: f64) -> Vector2<f64> {
     Vector2::new(angle.cos(), angle.sin())
-}
-
-/// Speed that the ball is to leave with (m/s) when the foot's effective mass is `mass` (kg).
-fn wanted_speed(body: &Body, request: &KickRequest, mass: f64) -> f64 {
-    match request.strength {
-        Strength::BallSpeed(v) => v,
-        Strength::FootSpeed(v) => v * body.ball.gain(mass),
-        Strength::Distance(d) => (2.0 * body.ball.deceleration * d).sqrt(),
-    }
-}
-
-/// The refusals that need no kinematics.
-fn check_place(body: &Body, ball: [f64; 2]) -> Result<(), Refusal> {
-    let distance = ball[0].hypot(ball[1]);
-    let reach = body.leg_length + body.ball.radius;
-    if distance > reach {
-        return Err(Refusal::TooFar { distance, reach });
-    }
-    // The rectangle of both feet and what is between them.
-    let [left, right] = &body.feet;
-    let y = [right.outline_y[0] - body.half_width, left.outline_y[1] + body.half_width];
-    let x = left.outline_x;
-    let outside = |value: f64, [low, high]: [f64; 2]| (low - value).max(value - high).max(0.0);
-    let gap = outside(ball[0], x).hypot(outside(ball[1], y)) - body.ball.radius;
-    let least = -0.25 * body.ball.radius;
-    if gap < least {
-        return Err(Refusal::BallUnderRobot { gap, least });
-    }
-    if ball[0] < x[0] {
-        return Err(Refusal::BallBehind { x: ball[0], least: x[0] });
-    }
-    Ok(())
-}
-
-/// The refusal that tells more: what came nearest to being possible.
-fn graver(old: Option<Refusal>, new: Refusal) -> Refusal {
-    let rank = |r: &Refusal| match r {
-        Refusal::Unreachable { place: Place::Contact, gap, .. } => -gap.min(10.0),
-        Refusal::Unreachable { gap, .. } => 1.0 - gap.min(0.9),
-        Refusal::SelfCollision { .. } => 2.0,
-        Refusal::OffBalance { .. } | Refusal::TooHeavy { .. } => 3.0,
-        Refusal::TooFast { share, .. } => 5.0 - (share / 100.0).min(0.9),
-        _ => 9.0,
-    };
-    match old {
-        Some(old) if rank(&old) >= rank(&new) => old,
-        _ => new,
-    }
 }

@@ -7,7 +7,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::KickError;
 use crate::settings::{Settings, within};
-use crate::whole_body::{Feedback, Limits, Stance};
+use crate::whole_body::motion::Manner;
+use crate::whole_body::{Feedback, Limits, Stance, Times};
 
 /// All numbers of the engine for one robot.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -65,26 +66,6 @@ pub struct Swing {
     pub base_yaw: f64,
 }
 
-/// How long phases take; the swing's times follow from distance and speed.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Times {
-    /// Shift of the weight over the support foot, s.
-    pub shift: f64,
-    /// Pause on the support foot before the foot is raised, s.
-    pub settle: f64,
-    /// Fastest mean speed of the foot outside the kick, m/s.
-    pub foot_speed: f64,
-    /// Least time of a foot motion outside the kick, s.
-    pub foot_least: f64,
-    /// Pause at the wind-up point, s.
-    pub aim: f64,
-    /// Lowering of the foot, s.
-    pub lower: f64,
-    /// Shift of the weight back, s.
-    pub shift_back: f64,
-}
-
 /// Stated standard deviation of the ball's direction, rad, measured with KickBench.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -95,12 +76,20 @@ pub struct Accuracy {
     pub side: f64,
 }
 
+impl DynamicSettings {
+    /// What the motion takes from them.
+    pub(crate) fn manner(&self) -> Manner<'_> {
+        let (swing, times, stance) = (&self.swing, &self.times, &self.stance);
+        Manner { times, stance, lift: swing.lift, follow: swing.follow, base_yaw: swing.base_yaw }
+    }
+}
+
 impl Settings for DynamicSettings {
     const FILE: &'static str = "dynamic.toml";
     const HOLDS: &'static str = "the dynamic engine's settings";
 
     fn validate(&self) -> Result<(), KickError> {
-        let (s, t) = (&self.swing, &self.times);
+        let s = &self.swing;
         for (field, value, low, high) in [
             ("control_period", self.control_period, 0.001, 0.02),
             ("swing.speed_gain", s.speed_gain, 0.3, 3.0),
@@ -114,18 +103,12 @@ impl Settings for DynamicSettings {
             ("swing.corridor", s.corridor, 0.0, 2.0),
             ("swing.yaw", s.yaw, 0.0, 1.6),
             ("swing.base_yaw", s.base_yaw, 0.0, 1.0),
-            ("times.shift", t.shift, 0.1, 5.0),
-            ("times.settle", t.settle, 0.0, 5.0),
-            ("times.foot_speed", t.foot_speed, 0.01, 5.0),
-            ("times.foot_least", t.foot_least, 0.02, 5.0),
-            ("times.aim", t.aim, 0.0, 5.0),
-            ("times.lower", t.lower, 0.02, 5.0),
-            ("times.shift_back", t.shift_back, 0.1, 5.0),
             ("accuracy.front", self.accuracy.front, 0.0, 3.2),
             ("accuracy.side", self.accuracy.side, 0.0, 3.2),
         ] {
             within(field, value, low, high)?;
         }
+        self.times.validate()?;
         self.stance.validate()?;
         self.limits.validate()?;
         self.feedback.validate()

@@ -29,22 +29,23 @@ use nalgebra::Vector3;
 
 use crate::KickError;
 use crate::ball::BallModel;
-use crate::engine::{KickEngine, KickPlan, KickStatus, Phase, Progress};
+use crate::engine::{KickEngine, KickPlan, Phase, Progress};
 use crate::ik::{Goals, Ik, Residual};
 use crate::request::{KickRequest, Refusal};
 use crate::settings::Settings;
 use crate::tree::{Tree, TreePose};
 use crate::whole_body::balance::Balance;
 use crate::whole_body::body::Body;
-use crate::whole_body::drive::{STEADY_TILT, inside, up};
+use crate::whole_body::drive::{Footing, STEADY_TILT, inertial, inside, tilt, turn_ankles};
+use crate::whole_body::timeline::Course;
 use crate::whole_body::torque::Dynamics;
 use motion::{Motion, zmp_stand};
 use plan::Planner;
-use regulator::{GRAVITY, Regulator};
+use regulator::Regulator;
 use two_link::TwoLink;
 use zmp::{Filter, Measured, measure};
 
-pub use settings::{Com, Gains, Kick, PreviewSettings, Stabiliser, Stance, Swing, Times, Weights};
+pub use settings::{Com, Gains, Kick, PreviewSettings, Stabiliser, Swing, Weights};
 
 /// Steps of inverse kinematics in a tick: to the newest sample, and from there to the one that is commanded.
 const TICK_STEPS: [usize; 2] = [2, 1];
@@ -132,9 +133,7 @@ pub struct PreviewKick {
     states: [[Vector3<f64>; 2]; 3],
     /// The jerks that led to the newest sample and to the one before.
     jerks: [[f64; 2]; 2],
-    status: KickStatus,
-    hold: bool,
-    cancel: bool,
+    course: Course,
     balanced: Balanced,
 }
 
@@ -177,9 +176,7 @@ impl PreviewKick {
             sample: 0,
             states: [[Vector3::zeros(); 2]; 3],
             jerks: [[0.0; 2]; 2],
-            status: KickStatus::Idle,
-            hold: false,
-            cancel: false,
+            course: Course::idle(),
             balanced: Balanced::default(),
             body,
             settings,
@@ -213,7 +210,7 @@ impl PreviewKick {
     /// Starts `motion` from the stand.
     fn start(&mut self, motion: Motion, standing: bool) {
         let dt = self.settings.control_period;
-        let count = (motion.end() / dt).ceil() as usize + 1;
+        let count = (motion.timeline.end() / dt).ceil() as usize + 1;
         let room = count + (WAY_BACK / dt) as usize;
         self.motion = motion;
         self.sample = 0;
@@ -249,7 +246,7 @@ impl PreviewKick {
             return;
         }
         self.reference.truncate(self.sample + 1);
-        let count = (self.motion.end() / dt).ceil() as usize + 1;
+        let count = (self.motion.timeline.end() / dt).ceil() as usize + 1;
         while self.reference.len() < count.min(self.reference.capacity()) {
             self.reference.push(self.motion.zmp(self.reference.len() as f64 * dt));
         }
@@ -268,35 +265,27 @@ impl PreviewKick {
         self.time() - 1.5 * self.settings.control_period
     }
 
-    fn running(&self) -> bool {
-        matches!(self.status, KickStatus::Running | KickStatus::Holding | KickStatus::Cancelling)
-    }
-
-    /// Whether the foot waits at the retraction point; moves the status and the clock on.
+    /// Whether the foot waits at the retraction point; moves the course and the clock on.
     fn pass(&mut self) -> bool {
-        let waits = self.hold && self.time() >= self.motion.end_of(Phase::WindUp) - 1e-9;
-        if self.running() {
-            self.status = match self.status {
-                KickStatus::Running if waits => KickStatus::Holding,
-                KickStatus::Holding if !waits => KickStatus::Running,
-                status => status,
-            };
-            if !waits {
-                self.sample += 1;
-            }
-            if self.clock() >= self.motion.end() {
-                let cancelled = self.status == KickStatus::Cancelling;
-                self.status = if cancelled { KickStatus::Cancelled } else { KickStatus::Finished };
-            }
+        if !self.course.running() {
+            return false;
         }
-        waits && self.running()
+        let waits = self.course.hold && self.time() >= self.motion.timeline.end_of(Phase::WindUp) - 1e-9;
+        self.course.step(waits);
+        if !waits {
+            self.sample += 1;
+        }
+        if self.clock() >= self.motion.timeline.end() {
+            self.course.finish();
+        }
+        waits
     }
 
     /// One sample of estimate and preview control; `waits`: the reference stands still.
     fn control(&mut self, measured: &Measured, waits: bool) {
         let dt = self.settings.control_period;
         let last = if waits { self.sample } else { self.reference.len() - 1 }.min(self.reference.len() - 1);
-        let follows = self.settings.has(Stabiliser::Preview) && self.running();
+        let follows = self.settings.has(Stabiliser::Preview) && self.course.running();
         let mut next = self.states[0];
         for axis in 0..2 {
             // What is measured now belongs to the sample before the last.
@@ -322,36 +311,18 @@ impl PreviewKick {
         self.balanced.estimated = [self.filters[0].zmp(), self.filters[1].zmp()];
         self.balanced.estimated_com = [self.filters[0].state().x, self.filters[1].state().x];
     }
-
-    /// How far the base leans from the plan: a rotation vector in the base frame, rad, without yaw.
-    fn tilt(&self, sensors: &Sensors) -> Vector3<f64> {
-        let sole = &self.body.robot.leg(self.motion.swing.other()).sole;
-        up(sensors).cross(&(self.now.rotation[sole.link] * Vector3::z()))
-    }
-
-    /// The moment of the inertial sensor's loop on the body, in the base frame, N m.
-    fn inertial(&self, sensors: &Sensors) -> Vector3<f64> {
-        let swing = self.motion.swing;
-        let weight = self.body.tree.mass() * GRAVITY;
-        let foot = &self.body.feet[swing.other() as usize];
-        let half = |[low, high]: [f64; 2]| 0.5 * (high - low) * weight;
-        let limits = [half(foot.stand_y), half(foot.stand_x)];
-        let height = self.body.stand(swing).com.z;
-        self.balance.moment(&self.tilt(sensors), &Vector3::from(sensors.gyro), weight * height, limits)
-    }
 }
 
 impl Controller for PreviewKick {
     fn tick(&mut self, sensors: &Sensors, command: &mut JointCommand) {
         let dt = self.settings.control_period;
-        if std::mem::take(&mut self.cancel) && self.running() {
+        if self.course.turns_back() {
             self.turn_back();
-            self.status = KickStatus::Cancelling;
-            self.hold = false;
         }
         let waits = self.pass();
         let swing = self.motion.swing;
-        let both = self.motion.both_feet(self.clock());
+        let active = self.course.running();
+        let footing = Footing { swing, both: self.motion.timeline.both_feet(self.clock()), active };
         let measured = measure(&self.body.robot, &self.body.tree, sensors, swing.other(), &mut self.seen);
         self.control(&measured, waits);
 
@@ -365,13 +336,13 @@ impl Controller for PreviewKick {
         self.balanced.placement = residual.balance;
         self.dynamics.push(&self.body, swing.other(), &self.angles, &self.pose);
         self.body.tree.update(self.dynamics.angles(), &mut self.now);
-        self.balanced.planned = self.dynamics.solve(&self.body, swing, &self.now, dt, both);
+        self.balanced.planned = self.dynamics.solve(&self.body, swing, &self.now, dt, footing.both);
 
         // The plan of the middle sample, shifted by the closed loop.
-        let tilt = self.tilt(sensors);
+        let tilt = tilt(&self.body, &self.now, swing, sensors);
         let estimated = measured.zmp.map(|_| self.balanced.estimated);
         let steady = tilt.norm() < STEADY_TILT && estimated.is_none_or(|at| inside(&self.body, at, swing.other()));
-        let shift = self.balance.shift(estimated, self.balanced.planned, (self.running(), steady), dt);
+        let shift = self.balance.shift(estimated, self.balanced.planned, (active, steady), dt);
         self.held_angles.copy_from_slice(self.dynamics.angles());
         if shift != [0.0; 2] {
             let middle = if waits { time } else { time - dt };
@@ -382,15 +353,8 @@ impl Controller for PreviewKick {
         command.positions.copy_from_slice(&self.held_angles);
         command.velocities.copy_from_slice(self.dynamics.speeds());
         command.torques.copy_from_slice(&self.dynamics.torques);
-        // A moment on the body is the opposite of one on the foot, which is what the ankle's torque turns.
-        let moment = self.inertial(sensors);
-        let feet: &[Side] = if both { &[Side::Left, Side::Right] } else { &[swing.other()] };
-        for side in feet {
-            let leg = self.body.robot.leg(*side);
-            for joint in [leg.ankle_pitch, leg.ankle_roll] {
-                command.torques[joint] -= self.now.axis[joint].dot(&moment) / feet.len() as f64;
-            }
-        }
+        let moment = inertial(&self.body, &self.balance, swing, &tilt, sensors);
+        turn_ankles(&self.body, &self.now, &footing, &moment, command);
     }
 }
 
@@ -404,40 +368,25 @@ impl KickEngine for PreviewKick {
     }
 
     fn plan(&mut self, request: &KickRequest, sensors: &Sensors) -> Result<KickPlan, Refusal> {
-        if self.running() {
+        if self.course.running() {
             return Err(Refusal::Busy);
         }
-        for (joint, (now, stand)) in sensors.joint_positions.iter().zip(&self.body.angles).enumerate() {
-            let off = now - stand;
-            // Written so that a NaN fails.
-            if !matches!(off.abs().partial_cmp(&self.settings.limits.stand), Some(o) if o.is_le()) {
-                return Err(Refusal::NotStanding { joint, off });
-            }
-        }
+        self.body.check_standing(sensors, self.settings.limits.stand)?;
         let planned = self.planner.plan(&self.body, &self.settings, &self.regulator, request)?;
         self.start(planned.motion, false);
-        self.status = KickStatus::Running;
-        self.hold = request.hold;
-        self.cancel = false;
+        self.course = Course::started(request.hold);
         Ok(planned.plan)
     }
 
     fn release(&mut self) {
-        self.hold = false;
+        self.course.hold = false;
     }
 
     fn cancel(&mut self) {
-        self.cancel = true;
+        self.course.cancel();
     }
 
     fn progress(&self) -> Progress {
-        let (clock, end, over) = (self.clock(), self.motion.end(), !self.running());
-        Progress {
-            status: self.status,
-            phase: if over { Phase::Stand } else { self.motion.phase(clock) },
-            done: if over || end <= 0.0 { 1.0 } else { (clock / end).clamp(0.0, 1.0) },
-            to_contact: self.motion.contact.filter(|_| !over).map(|contact| contact - clock),
-            foot: (!over).then_some(self.motion.swing),
-        }
+        self.course.progress(&self.motion.timeline, self.clock(), self.motion.contact, self.motion.swing)
     }
 }

@@ -4,14 +4,15 @@
 
 use instep_motion::phase::Side;
 use instep_motion::spline::State;
-use nalgebra::Vector3;
 
 use crate::engine::Phase;
 use crate::ik::Goals;
 use crate::preview::settings::PreviewSettings;
 use crate::preview::stroke::Stroke;
 use crate::whole_body::body::Body;
+use crate::whole_body::motion::{place, way_back};
 use crate::whole_body::path::Path;
+use crate::whole_body::timeline::Timeline;
 
 /// Half the step of the differences that give the foot's speed, s.
 const STEP: f64 = 1e-4;
@@ -29,11 +30,11 @@ pub(crate) struct Motion {
     trunk: Path<5>,
     /// Reference of the zero-moment point, x and y.
     zmp: Path<2>,
-    /// Ends of the phases from [`Phase::Shift`] to [`Phase::ShiftBack`].
-    ends: [f64; 7],
+    pub(crate) timeline: Timeline,
     pub(crate) contact: Option<f64>,
 }
 
+/// The trunk on two feet: base height, roll, pitch, yaw; share of the arms' way.
 fn trunk_stand(body: &Body, swing: Side) -> [f64; 5] {
     let stand = body.stand(swing);
     let [roll, pitch, yaw] = stand.base;
@@ -42,21 +43,15 @@ fn trunk_stand(body: &Body, swing: Side) -> [f64; 5] {
 
 /// The trunk over the support foot, with the base's share of the foot's `yaw`.
 pub(crate) fn trunk_support(body: &Body, settings: &PreviewSettings, swing: Side, yaw: f64) -> [f64; 5] {
-    let stand = body.stand(swing);
     let s = &settings.stance;
-    let [roll, pitch, base_yaw] = stand.base;
-    [
-        stand.height - s.crouch,
-        roll + Body::sign(swing) * s.roll,
-        pitch + s.pitch,
-        base_yaw + settings.swing.base_yaw * yaw,
-        1.0,
-    ]
+    let [height, roll, pitch, yaw] =
+        body.base_support(swing, s.crouch, [s.roll, s.pitch], settings.swing.base_yaw * yaw);
+    [height, roll, pitch, yaw, 1.0]
 }
 
 /// The reference of the zero-moment point in the support sole, m.
 pub(crate) fn zmp_support(settings: &PreviewSettings, swing: Side) -> [f64; 2] {
-    let [x, y] = settings.stance.zmp;
+    let [x, y] = settings.stance.balance;
     [x, Body::sign(swing) * y]
 }
 
@@ -69,7 +64,7 @@ pub(crate) fn zmp_stand(body: &Body, swing: Side) -> [f64; 2] {
 /// Goals from the parts.
 pub(crate) fn goals(foot: &[f64; 5], trunk: &[f64; 5], com: [f64; 2]) -> Goals {
     Goals {
-        position: Vector3::new(foot[0], foot[1], foot[2]),
+        position: place(foot),
         yaw_pitch: [foot[3], foot[4]],
         balance: com,
         height: trunk[0],
@@ -77,14 +72,10 @@ pub(crate) fn goals(foot: &[f64; 5], trunk: &[f64; 5], com: [f64; 2]) -> Goals {
     }
 }
 
-fn distance(a: &[f64; 5], b: &[f64; 5]) -> f64 {
-    (Vector3::new(a[0], a[1], a[2]) - Vector3::new(b[0], b[1], b[2])).norm()
-}
-
 impl Motion {
     /// Stands for ever, as seen from the support foot of `swing`.
     pub(crate) fn standing(body: &Body, swing: Side) -> Self {
-        let foot = Path::starting(0.0, State::at_rest(home(body, swing)));
+        let foot = Path::starting(0.0, State::at_rest(body.home(swing)));
         Self {
             swing,
             before: foot,
@@ -92,7 +83,7 @@ impl Motion {
             kick: None,
             trunk: Path::starting(0.0, State::at_rest(trunk_stand(body, swing))),
             zmp: Path::starting(0.0, State::at_rest(zmp_stand(body, swing))),
-            ends: [0.0; 7],
+            timeline: Timeline::default(),
             contact: None,
         }
     }
@@ -105,24 +96,28 @@ impl Motion {
         motion.zmp.hold(0.25 * times.shift);
         motion.zmp.to(0.5 * times.shift, State::at_rest(zmp_support(settings, swing)));
         motion.trunk.to(times.shift, State::at_rest(trunk_support(body, settings, swing, 0.0)));
-        motion.before.hold(times.shift);
-        motion.ends[0] = motion.before.end();
-        let lifted = lifted(body, settings, swing);
+        motion.trunk.hold(times.settle);
+        motion.before.hold(times.shift + times.settle);
+        motion.timeline.end_at(Phase::Shift, motion.before.end());
+        let lifted = body.lifted(swing, settings.swing.lift);
         motion.before.to(times.foot_least, State::at_rest(lifted));
         motion.trunk.hold(times.foot_least);
-        motion.ends[1] = motion.before.end();
+        motion.timeline.end_at(Phase::Raise, motion.before.end());
         let retraction = stroke.retraction();
-        let duration = (distance(&retraction, &lifted) / times.foot_speed).max(times.foot_least);
+        let way = (place(&retraction) - place(&lifted)).norm();
+        let duration = (way / times.foot_speed).max(times.foot_least);
         motion.before.to(duration, State::at_rest(retraction));
         motion.trunk.to(duration, State::at_rest(trunk_support(body, settings, swing, stroke.yaw)));
         motion.before.hold(times.aim);
-        motion.ends[2] = motion.before.end();
-        motion.kick = Some((motion.ends[2], *stroke));
-        motion.contact = Some(motion.ends[2] + stroke.time * stroke.shape.contact);
-        motion.ends[3] = motion.ends[2] + stroke.time;
-        motion.trunk.hold(motion.ends[3] - motion.trunk.end());
-        motion.zmp.hold(motion.ends[3] - motion.zmp.end());
-        motion.after = Path::starting(motion.ends[3], State::at_rest(stroke.end()));
+        let start = motion.before.end();
+        let end = start + stroke.time;
+        motion.timeline.end_at(Phase::WindUp, start);
+        motion.kick = Some((start, *stroke));
+        motion.contact = Some(start + stroke.time * stroke.shape.contact);
+        motion.timeline.end_at(Phase::Kick, end);
+        motion.trunk.hold(end - motion.trunk.end());
+        motion.zmp.hold(end - motion.zmp.end());
+        motion.after = Path::starting(end, State::at_rest(stroke.end()));
         motion.back(body, settings);
         motion
     }
@@ -130,22 +125,17 @@ impl Motion {
     /// From where the paths end, foot in the air: over its place, down, and the weight back between the feet.
     fn back(&mut self, body: &Body, settings: &PreviewSettings) {
         let times = &settings.times;
-        let lifted = lifted(body, settings, self.swing);
+        let lifted = body.lifted(self.swing, settings.swing.lift);
         let last = self.after.last();
-        let way = distance(&lifted, &last.position);
-        let [vx, vy, vz, ..] = last.velocity;
-        let speed = Vector3::new(vx, vy, vz).norm();
-        // A moving foot needs time to stop: at least what a brake over the follow-through would take.
-        let brake = 2.0 * settings.swing.follow / speed.max(0.1);
-        let stop = if speed > 0.05 { (1.5 * times.foot_least).max(brake.min(0.6)) } else { 0.0 };
-        let duration = (way / times.foot_speed).max(times.foot_least).max(stop);
+        let (way, speed) = ((place(&lifted) - place(&last.position)).norm(), place(&last.velocity).norm());
+        let duration = way_back(times, settings.swing.follow, way, speed);
         self.after.to(duration, State::at_rest(lifted));
         self.trunk.to(duration, State::at_rest(trunk_support(body, settings, self.swing, 0.0)));
-        self.ends[4] = self.after.end();
-        self.after.to(times.lower, State::at_rest(home(body, self.swing)));
+        self.timeline.end_at(Phase::MoveBack, self.after.end());
+        self.after.to(times.lower, State::at_rest(body.home(self.swing)));
         self.trunk.hold(times.lower);
-        self.ends[5] = self.after.end();
-        self.zmp.hold(self.ends[5] - self.zmp.end());
+        self.timeline.end_at(Phase::Lower, self.after.end());
+        self.zmp.hold(self.after.end() - self.zmp.end());
         self.weight_back(body, times.shift_back);
     }
 
@@ -155,13 +145,13 @@ impl Motion {
         self.zmp.hold(0.25 * duration);
         self.zmp.to(0.5 * duration, State::at_rest(zmp_stand(body, self.swing)));
         self.after.hold(duration);
-        self.ends[6] = self.after.end();
+        self.timeline.end_at(Phase::ShiftBack, self.after.end());
     }
 
     /// The shortest way back to the stand from `time`, for a cancel.
     pub(crate) fn cancelled(&self, body: &Body, settings: &PreviewSettings, time: f64) -> Self {
         let mut motion = *self;
-        let phase = self.phase(time);
+        let phase = self.timeline.phase(time);
         if matches!(phase, Phase::Stand | Phase::MoveBack | Phase::Lower | Phase::ShiftBack) {
             return motion;
         }
@@ -170,7 +160,7 @@ impl Motion {
         motion.after = Path::starting(time, self.foot_state(time));
         motion.before = motion.after;
         motion.kick = None;
-        motion.ends = [time; 7];
+        motion.timeline = Timeline::over(time);
         motion.contact = None;
         if phase == Phase::Shift {
             motion.weight_back(body, settings.times.shift_back);
@@ -183,7 +173,9 @@ impl Motion {
     /// Sole's x, y, z, yaw and pitch at `time`.
     pub(crate) fn foot(&self, time: f64) -> [f64; 5] {
         match &self.kick {
-            Some((start, stroke)) if time >= *start && time < self.ends[3] => stroke.at(time - start),
+            Some((start, stroke)) if time >= *start && time < self.timeline.end_of(Phase::Kick) => {
+                stroke.at(time - start)
+            }
             Some((start, _)) if time < *start => self.before.at(time).position,
             _ => self.after.at(time).position,
         }
@@ -213,42 +205,4 @@ impl Motion {
     pub(crate) fn arms(&self, time: f64) -> f64 {
         self.trunk.at(time).position[4]
     }
-
-    /// End, s.
-    pub(crate) fn end(&self) -> f64 {
-        self.ends[6]
-    }
-
-    /// End of a phase, s.
-    pub(crate) fn end_of(&self, phase: Phase) -> f64 {
-        match phase {
-            Phase::Stand => 0.0,
-            _ => self.ends[phase as usize - 1],
-        }
-    }
-
-    /// The phase at `time`.
-    pub(crate) fn phase(&self, time: f64) -> Phase {
-        const PHASES: [Phase; 7] =
-            [Phase::Shift, Phase::Raise, Phase::WindUp, Phase::Kick, Phase::MoveBack, Phase::Lower, Phase::ShiftBack];
-        PHASES.into_iter().zip(self.ends).find(|(_, end)| time < *end).map_or(Phase::Stand, |(phase, _)| phase)
-    }
-
-    /// Whether both feet stand at `time`.
-    pub(crate) fn both_feet(&self, time: f64) -> bool {
-        matches!(self.phase(time), Phase::Stand | Phase::Shift | Phase::ShiftBack)
-    }
-}
-
-/// The foot on its place.
-fn home(body: &Body, swing: Side) -> [f64; 5] {
-    let stand = body.stand(swing);
-    let [yaw, pitch] = stand.yaw_pitch;
-    [stand.home.x, stand.home.y, stand.home.z, yaw, pitch]
-}
-
-/// The foot over its place.
-fn lifted(body: &Body, settings: &PreviewSettings, swing: Side) -> [f64; 5] {
-    let [x, y, _, yaw, pitch] = home(body, swing);
-    [x, y, settings.swing.lift, yaw, pitch]
 }

@@ -7,35 +7,26 @@
 //! swinging leg beforehand (Kajita et al. 2003, section 5, the same with the preview controller as filter). Joint
 //! ranges, speeds, torques, gaps and the zero-moment point are held against their limits the second time.
 
-use std::f64::consts::FRAC_PI_4;
+use std::f64::consts::{FRAC_PI_4, PI};
 
 use instep_motion::phase::Side;
 use nalgebra::{Rotation3, Vector2, Vector3};
 
 use crate::engine::{Face, KickPlan, Phase};
-use crate::ik::Residual;
 use crate::preview::Placer;
 use crate::preview::motion::{Motion, goals, trunk_support, zmp_support};
 use crate::preview::regulator::Regulator;
 use crate::preview::settings::PreviewSettings;
 use crate::preview::stroke::{Shape, Stroke};
-use crate::request::{KickRequest, Place, Refusal, Strength};
+use crate::request::{KickRequest, Place, Refusal};
 use crate::tree::TreePose;
 use crate::whole_body::body::Body;
-use crate::whole_body::foot::{contact_point, paper_choice, paper_face};
+use crate::whole_body::foot::{contact_point, paper_choice, paper_face, wrap};
+use crate::whole_body::forecast::{
+    FAR, MIDDLE, NEAR, ROLL, TIPPING, WAY, check_place, fastest, graver, judge, miss, outside,
+};
 use crate::whole_body::torque::Dynamics;
 
-/// Steps of inverse kinematics to a place that is far from the last.
-const FAR: usize = 12;
-/// The same to a place a hand's breadth away.
-const MIDDLE: usize = 6;
-/// The same to a place near the last.
-const NEAR: usize = 3;
-/// The same along the way, which is sampled every tick.
-const WAY: usize = 2;
-/// Time constant with which the planned zero-moment point is smoothed before it is held against the foot, s: to tip takes
-/// about sqrt(h / g), so what is over sooner does not count in full.
-const TIPPING: f64 = 0.04;
 /// How long a motor may have to give more than it can outside the kick, s: the drives ride over less.
 const HELD: f64 = 0.06;
 /// Share of its speed limit below which every joint counts as holding a pose.
@@ -73,16 +64,6 @@ pub(crate) struct Planner {
     dynamics: Dynamics,
     /// What is taken off the reference of the zero-moment point, one entry a sample, m.
     pub(crate) correction: Vec<[f64; 2]>,
-}
-
-/// Distance that a residual counts as, m: 1 rad is 0.1 m.
-fn miss(residual: &Residual) -> f64 {
-    residual.position + 0.1 * residual.orientation + 0.03 * residual.roll + 0.5 * residual.balance
-}
-
-/// Angle in (-pi, pi].
-fn wrap(angle: f64) -> f64 {
-    angle.sin().atan2(angle.cos())
 }
 
 impl Planner {
@@ -146,7 +127,9 @@ impl Planner {
         time: f64,
     ) -> Result<Planned, Refusal> {
         let (ball, velocity) = body.ball.roll(request.ball, request.ball_velocity, time);
-        check_place(body, settings, ball, request.direction)?;
+        // Only the heel kicks what lies behind.
+        let heel = wrap(request.direction - PI).abs() <= settings.swing.yaw;
+        check_place(body, ball, heel)?;
         let mut candidates: Vec<Candidate> = Vec::new();
         let mut refusal: Option<Refusal> = None;
         for swing in [Side::Left, Side::Right].into_iter().filter(|side| request.foot.is_none_or(|foot| foot == *side))
@@ -184,7 +167,7 @@ impl Planner {
                         foot: candidate.stroke.swing,
                         face: candidate.stroke.face,
                         contact: motion.contact.unwrap_or(0.0),
-                        duration: motion.end(),
+                        duration: motion.timeline.end(),
                         foot_speed: candidate.stroke.speed(),
                         ball_speed: candidate.ball_speed,
                         precision: if front { settings.accuracy.front } else { settings.accuracy.side },
@@ -210,11 +193,7 @@ impl Planner {
         let s = &settings.swing;
         // A moving ball keeps its speed: the impulse must point from it to the wanted velocity.
         let ball_velocity = Vector2::from(velocity);
-        let wanted_speed = |mass: f64| match request.strength {
-            Strength::BallSpeed(v) => v,
-            Strength::FootSpeed(v) => v * body.ball.gain(mass),
-            Strength::Distance(d) => (2.0 * body.ball.deceleration * d).sqrt(),
-        };
+        let wanted_speed = |mass: f64| request.strength.ball_speed(&body.ball, mass);
         let wanted = Vector2::new(request.direction.cos(), request.direction.sin());
         let aim = wanted * wanted_speed(1.0) - ball_velocity;
         let direction = if ball_velocity.norm() > 0.02 { aim.y.atan2(aim.x) } else { request.direction };
@@ -265,13 +244,7 @@ impl Planner {
         let ahead = 0.01;
         let beyond = stroke.pose(&Vector3::new(ahead, 0.0, 0.0));
         let beyond = self.reach(body, settings, &stroke, beyond, Place::Contact, NEAR);
-        let share = body
-            .robot
-            .joints
-            .iter()
-            .enumerate()
-            .map(|(j, joint)| ((self.angles[j] - self.saved[j]) / ahead * asked / joint.speed, j))
-            .fold((0.0_f64, 0), |most, (share, j)| if share.abs() > most.0 { (share.abs(), j) } else { most });
+        let share = fastest(&body.robot, 0..body.robot.joints.len(), &self.saved, &self.angles, ahead / asked);
         if beyond.is_ok() && share.0 > settings.limits.speed {
             return Some(Err(Refusal::TooFast { foot: swing, asked, share: share.0, joint: share.1 }));
         }
@@ -327,28 +300,7 @@ impl Planner {
         let trunk = trunk_support(body, settings, stroke.swing, stroke.yaw);
         let goals = goals(&foot, &trunk, zmp_support(settings, stroke.swing));
         let residual = self.placer.solve(&body.tree, &mut self.pose, &mut self.angles, stroke.swing, &goals, steps);
-        self.judge(body, settings, stroke.swing, &residual, what)
-    }
-
-    /// Whether the present pose reaches its goals and no parts of it touch.
-    fn judge(
-        &self,
-        body: &Body,
-        settings: &PreviewSettings,
-        foot: Side,
-        residual: &Residual,
-        place: Place,
-    ) -> Result<(), Refusal> {
-        let gap = miss(residual);
-        // Written so that a NaN fails.
-        if !matches!(gap.partial_cmp(&settings.limits.reach), Some(o) if o.is_le()) {
-            return Err(Refusal::Unreachable { foot, place, gap });
-        }
-        let (gap, pair) = body.tree.least_gap(&self.pose);
-        if gap < settings.limits.clearance {
-            return Err(Refusal::SelfCollision { foot, pair, gap });
-        }
-        Ok(())
+        judge(body, &settings.limits, &self.pose, stroke.swing, what, miss(&residual, ROLL))
     }
 
     /// Distance of the present angles from the nearest joint limit, rad.
@@ -374,7 +326,7 @@ impl Planner {
     ) -> Result<(), Refusal> {
         let (swing, support) = (stroke.swing, stroke.swing.other());
         let (limits, dt) = (&settings.limits, settings.control_period);
-        let count = (motion.end() / dt).ceil() as usize + 1;
+        let count = (motion.timeline.end() / dt).ceil() as usize + 1;
         let reference: Vec<[f64; 2]> = (0..count)
             .map(|i| {
                 let zmp = motion.zmp(i as f64 * dt);
@@ -388,7 +340,7 @@ impl Planner {
         self.angles.copy_from_slice(&body.angles);
         body.tree.update(&self.angles, &mut self.pose);
         self.dynamics.fill(body, support, &self.angles, &self.pose);
-        let (up, down) = (motion.end_of(Phase::Raise), motion.end_of(Phase::MoveBack));
+        let (up, down) = (motion.timeline.end_of(Phase::Raise), motion.timeline.end_of(Phase::MoveBack));
         let contact = motion.contact.unwrap_or(down);
         let foot = &body.feet[support as usize];
         let mut zmp: Option<[f64; 2]> = None;
@@ -406,7 +358,7 @@ impl Planner {
             self.dynamics.push(body, support, &self.angles, &self.pose);
             // The pose is one sample ahead of the middle: good enough for axes of a forecast.
             let before = time - dt;
-            let single = !motion.both_feet(before);
+            let single = !motion.timeline.both_feet(before);
             let now = self.dynamics.solve(body, swing, &self.pose, dt, !single);
             if single && !check {
                 correction[sample - 1] = [0, 1].map(|k| (now[k] - pendulum[k]).clamp(-CORRECTION, CORRECTION));
@@ -415,9 +367,9 @@ impl Planner {
             if !check || !(up..down).contains(&before) {
                 continue;
             }
-            self.judge(body, settings, swing, &residual, Place::Way)?;
+            judge(body, limits, &self.pose, swing, Place::Way, miss(&residual, ROLL))?;
             let [(speed, fastest), (torque, strongest)] = self.dynamics.shares(&body.robot);
-            let quick = motion.phase(before) == Phase::Kick;
+            let quick = motion.timeline.phase(before) == Phase::Kick;
             let asked = stroke.speed();
             let too_fast = |share, joint| Err(Refusal::TooFast { foot: swing, asked, share, joint });
             // After the contact a joint may lag: nothing depends on it.
@@ -440,10 +392,7 @@ impl Planner {
                 .map(|(p, [low, high])| p.clamp(low - CORRECTION, high + CORRECTION));
             let smooth = zmp.map_or(now, |zmp| [0, 1].map(|k| zmp[k] + share * (now[k] - zmp[k])));
             zmp = Some(smooth);
-            let by = [(smooth[0], foot.stand_x), (smooth[1], foot.stand_y)]
-                .map(|(p, [low, high])| (low + limits.edge - p).max(p - high + limits.edge))
-                .into_iter()
-                .fold(f64::NEG_INFINITY, f64::max);
+            let by = outside(smooth, foot, limits.edge);
             if by > 0.0 {
                 return Err(Refusal::OffBalance { foot: swing, by });
             }
@@ -452,47 +401,5 @@ impl Planner {
             self.correction = correction;
         }
         Ok(())
-    }
-}
-
-/// The refusals that need no kinematics.
-fn check_place(body: &Body, settings: &PreviewSettings, ball: [f64; 2], direction: f64) -> Result<(), Refusal> {
-    let distance = ball[0].hypot(ball[1]);
-    let reach = body.leg_length + body.ball.radius;
-    if distance > reach {
-        return Err(Refusal::TooFar { distance, reach });
-    }
-    // The rectangle of both feet and what is between them.
-    let [left, right] = &body.feet;
-    let y = [right.outline_y[0] - body.half_width, left.outline_y[1] + body.half_width];
-    let x = left.outline_x;
-    let outside = |value: f64, [low, high]: [f64; 2]| (low - value).max(value - high).max(0.0);
-    let gap = outside(ball[0], x).hypot(outside(ball[1], y)) - body.ball.radius;
-    let least = -0.25 * body.ball.radius;
-    if gap < least {
-        return Err(Refusal::BallUnderRobot { gap, least });
-    }
-    // Only the heel kicks what lies behind.
-    let backward = wrap(direction - std::f64::consts::PI).abs() <= settings.swing.yaw;
-    if ball[0] < x[0] && !backward {
-        return Err(Refusal::BallBehind { x: ball[0], least: x[0] });
-    }
-    Ok(())
-}
-
-/// The refusal that tells more: what came nearest to being possible.
-fn graver(old: Option<Refusal>, new: Refusal) -> Refusal {
-    let rank = |r: &Refusal| match r {
-        Refusal::Unreachable { place: Place::Contact, gap, .. } => -gap.min(10.0),
-        Refusal::Unreachable { gap, .. } => 1.0 - gap.min(0.9),
-        Refusal::SelfCollision { .. } => 2.0,
-        Refusal::OffBalance { .. } | Refusal::TooHeavy { .. } => 3.0,
-        Refusal::TooFast { share, .. } => 5.0 - (share / 100.0).min(0.9),
-        Refusal::TooStrong { asked, most, .. } => 5.0 - (asked / most / 100.0).min(0.9),
-        _ => 9.0,
-    };
-    match old {
-        Some(old) if rank(&old) >= rank(&new) => old,
-        _ => new,
     }
 }

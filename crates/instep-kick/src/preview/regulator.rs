@@ -17,9 +17,7 @@ use nalgebra::{Matrix3, RowVector3, SMatrix, Vector3};
 
 use crate::KickError;
 use crate::preview::riccati;
-
-/// Gravity, m/s^2.
-pub(crate) const GRAVITY: f64 = 9.81;
+use crate::whole_body::drive::GRAVITY;
 
 /// The controller of one axis; the same for both.
 #[derive(Debug, Clone, PartialEq)]

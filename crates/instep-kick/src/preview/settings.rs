@@ -9,7 +9,7 @@ use crate::KickError;
 use crate::dynamic::Accuracy;
 use crate::preview::zmp::Trust;
 use crate::settings::{Settings, within};
-use crate::whole_body::{Feedback, Limits, Pid};
+use crate::whole_body::{Feedback, Limits, Pid, Stance, Times};
 
 /// All numbers of the engine for one robot.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -33,9 +33,9 @@ pub struct PreviewSettings {
     pub kick: Kick,
     /// Geometry of the swing.
     pub swing: Swing,
-    /// How long phases take.
+    /// How long phases take; the zero-moment point goes over, and back, in the middle half of the shift.
     pub times: Times,
-    /// Where body and zero-moment point go.
+    /// Where body and zero-moment point go: `balance` is the latter's constant reference in the support sole.
     pub stance: Stance,
     /// Joint angles (rad) that arms and head take while the foot is up, so that they are out of the legs' way; joints
     /// not named keep their standing angle. No joint of a leg.
@@ -131,38 +131,6 @@ pub struct Swing {
     pub base_yaw: f64,
 }
 
-/// How long phases take; the kick's time follows from the curve and the strength.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Times {
-    /// From the stand to the foot's lifting; the zero-moment point goes over in its middle half, s.
-    pub shift: f64,
-    /// Fastest mean speed of the foot outside the kick, m/s.
-    pub foot_speed: f64,
-    /// Least time of a foot motion outside the kick, s.
-    pub foot_least: f64,
-    /// Pause at the retraction point, s.
-    pub aim: f64,
-    /// Lowering of the foot, s.
-    pub lower: f64,
-    /// From the foot's landing to the stand; the zero-moment point goes back in its middle half, s.
-    pub shift_back: f64,
-}
-
-/// Where body and zero-moment point go.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Stance {
-    /// The constant reference of the zero-moment point in the support sole, m: forward, and toward the other foot.
-    pub zmp: [f64; 2],
-    /// How much lower the base is than in the stand, m: bent knees reach farther.
-    pub crouch: f64,
-    /// Pitch of the base while the foot is up, rad, forward positive.
-    pub pitch: f64,
-    /// Roll of the base toward the support side while the foot is up, rad.
-    pub roll: f64,
-}
-
 /// The gains of the stabilisers; those that are not in `stabilisers` do nothing.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -216,7 +184,7 @@ impl Settings for PreviewSettings {
     const HOLDS: &'static str = "the preview engine's settings";
 
     fn validate(&self) -> Result<(), KickError> {
-        let (w, k, s, t, f) = (&self.regulator, &self.kick, &self.swing, &self.times, &self.feedback);
+        let (w, k, s, f) = (&self.regulator, &self.kick, &self.swing, &self.feedback);
         for (field, value, low, high) in [
             ("control_period", self.control_period, 0.001, 0.02),
             ("regulator.q", w.q, 1e-6, 1e6),
@@ -244,17 +212,6 @@ impl Settings for PreviewSettings {
             ("swing.corridor", s.corridor, 0.0, 2.0),
             ("swing.yaw", s.yaw, 0.0, 1.6),
             ("swing.base_yaw", s.base_yaw, 0.0, 1.0),
-            ("times.shift", t.shift, 0.1, 5.0),
-            ("times.foot_speed", t.foot_speed, 0.01, 5.0),
-            ("times.foot_least", t.foot_least, 0.02, 5.0),
-            ("times.aim", t.aim, 0.0, 5.0),
-            ("times.lower", t.lower, 0.02, 5.0),
-            ("times.shift_back", t.shift_back, 0.1, 5.0),
-            ("stance.zmp[0]", self.stance.zmp[0], -0.2, 0.2),
-            ("stance.zmp[1]", self.stance.zmp[1], -0.2, 0.2),
-            ("stance.crouch", self.stance.crouch, -0.1, 0.3),
-            ("stance.pitch", self.stance.pitch, -0.5, 0.8),
-            ("stance.roll", self.stance.roll, -0.5, 0.5),
             ("accuracy.front", self.accuracy.front, 0.0, 3.2),
             ("accuracy.side", self.accuracy.side, 0.0, 3.2),
             ("feedback.preview", f.preview, 0.0, 50.0),
@@ -265,13 +222,10 @@ impl Settings for PreviewSettings {
         ] {
             within(field, value, low, high)?;
         }
-        for (axis, pid) in [("x", &f.x), ("y", &f.y)] {
-            for (part, value, high) in
-                [("p", pid.p, 10.0), ("i", pid.i, 50.0), ("d", pid.d, 5.0), ("limit", pid.limit, 0.2)]
-            {
-                within(&format!("feedback.{axis}.{part}"), value, 0.0, high)?;
-            }
-        }
+        f.x.validate("feedback.x")?;
+        f.y.validate("feedback.y")?;
+        self.times.validate()?;
+        self.stance.validate()?;
         self.limits.validate()
     }
 }

@@ -21,7 +21,7 @@ use crate::KickError;
 use crate::preview::regulator::cart_table;
 use crate::preview::riccati;
 use crate::tree::{Tree, TreePose};
-use crate::whole_body::drive::up;
+use crate::whole_body::drive::{GRAVITY, LOADED, up};
 
 /// How much the filter trusts what; standard deviations.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -105,9 +105,6 @@ pub struct Measured {
     pub zmp: Option<[f64; 2]>,
 }
 
-/// Least share of the weight on the sensors.
-const LOADED: f64 = 0.1;
-
 /// Reads the sensors; `pose` is scratch space and holds the measured pose afterwards.
 pub fn measure(robot: &Robot, tree: &Tree, sensors: &Sensors, support: Side, pose: &mut TreePose) -> Measured {
     tree.update(&sensors.joint_positions, pose);
@@ -129,6 +126,6 @@ pub fn measure(robot: &Robot, tree: &Tree, sensors: &Sensors, support: Side, pos
     }
     let zmp = moment.map(|m| m / load);
     let finite = |at: [f64; 2]| at.iter().all(|v| v.is_finite()).then_some(at);
-    let loaded = load > LOADED * tree.mass() * crate::preview::regulator::GRAVITY;
+    let loaded = load > LOADED * tree.mass() * GRAVITY;
     Measured { com: finite(com), zmp: if loaded { finite(zmp) } else { None } }
 }

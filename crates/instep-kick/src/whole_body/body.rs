@@ -5,11 +5,13 @@ use std::sync::Arc;
 
 use instep_motion::phase::Side;
 use instep_robot::Robot;
-use nalgebra::{Rotation3, Vector3};
+use instep_robot::control::Sensors;
+use nalgebra::{Rotation2, Rotation3, Vector2, Vector3};
 
 use crate::KickError;
 use crate::ball::BallModel;
-use crate::tree::Tree;
+use crate::request::Refusal;
+use crate::tree::{Tree, TreePose};
 use crate::whole_body::foot::Foot;
 
 /// The robot standing, in the frame of one sole.
@@ -105,6 +107,53 @@ impl Body {
     /// The stand as seen from the support foot of a kick with `swing`.
     pub(crate) fn stand(&self, swing: Side) -> &Stand {
         &self.stands[swing as usize]
+    }
+
+    /// The sole of the swing foot on its place: x, y, z, yaw, pitch.
+    pub(crate) fn home(&self, swing: Side) -> [f64; 5] {
+        let stand = self.stand(swing);
+        let [yaw, pitch] = stand.yaw_pitch;
+        [stand.home.x, stand.home.y, stand.home.z, yaw, pitch]
+    }
+
+    /// The same at the height `lift` (m).
+    pub(crate) fn lifted(&self, swing: Side, lift: f64) -> [f64; 5] {
+        let [x, y, _, yaw, pitch] = self.home(swing);
+        [x, y, lift, yaw, pitch]
+    }
+
+    /// Height, roll, pitch and yaw of the base on the support foot: `crouch` (m) lower than in the stand, rolled toward
+    /// that foot and pitched forward by `tilt`, turned by `yaw` (rad).
+    pub(crate) fn base_support(&self, swing: Side, crouch: f64, tilt: [f64; 2], yaw: f64) -> [f64; 4] {
+        let stand = self.stand(swing);
+        let [base_roll, base_pitch, base_yaw] = stand.base;
+        let [roll, pitch] = tilt;
+        [stand.height - crouch, base_roll + Self::sign(swing) * roll, base_pitch + pitch, base_yaw + yaw]
+    }
+
+    /// Whether the robot stands, no joint farther than `most` (rad) from there.
+    ///
+    /// # Errors
+    /// Names the joint.
+    pub(crate) fn check_standing(&self, sensors: &Sensors, most: f64) -> Result<(), Refusal> {
+        for (joint, (now, stand)) in sensors.joint_positions.iter().zip(&self.angles).enumerate() {
+            let off = now - stand;
+            // Written so that a NaN fails.
+            if !matches!(off.abs().partial_cmp(&most), Some(o) if o.is_le()) {
+                return Err(Refusal::NotStanding { joint, off });
+            }
+        }
+        Ok(())
+    }
+
+    /// Where a ball that is seen at `seen` (m, from the base's ground projection, in its heading) is in the support
+    /// sole's frame, for a robot in `pose`.
+    pub(crate) fn sighted(&self, pose: &TreePose, swing: Side, seen: [f64; 3]) -> Vector2<f64> {
+        let sole = &self.robot.leg(swing.other()).sole;
+        let turn = pose.rotation[sole.link].transpose();
+        let base = turn * (-pose.point(sole));
+        let yaw = turn[(1, 0)].atan2(turn[(0, 0)]);
+        base.xy() + Rotation2::new(yaw) * Vector2::new(seen[0], seen[1])
     }
 
     /// A footprint point in the support sole's frame of a kick with `swing`.

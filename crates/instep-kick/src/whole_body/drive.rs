@@ -23,7 +23,9 @@ pub(crate) const STEADY_TILT: f64 = 0.04;
 /// Distance of the centre of pressure from the foot's edge from which on the foot counts as rocking, m.
 const EDGE: f64 = 0.006;
 /// Load (share of the weight) from which a foot's centre of pressure counts.
-const LOADED: f64 = 0.1;
+pub(crate) const LOADED: f64 = 0.1;
+/// m/s^2.
+pub(crate) const GRAVITY: f64 = 9.81;
 
 /// What keeps the robot upright.
 #[derive(Debug, Clone, Copy)]
@@ -123,7 +125,7 @@ impl Drive {
         let Footing { swing, both, active } = footing;
         let middle = self.middle.unwrap_or(*newest);
         let measured = self.measured(body, swing, sensors);
-        let tilt = self.tilt(body, swing, sensors);
+        let tilt = tilt(body, &self.now, swing, sensors);
         let mut held = middle.goals;
         let mut moment = Vector3::zeros();
         match &mut self.stabiliser {
@@ -132,12 +134,7 @@ impl Drive {
                 let shift = balance.shift(measured, self.planned_cop, (active, steady), dt);
                 held.balance[0] += shift[0];
                 held.balance[1] += shift[1];
-                let rate = Vector3::from(sensors.gyro);
-                let weight = body.tree.mass() * 9.81;
-                let foot = &body.feet[swing.other() as usize];
-                let half = |[low, high]: [f64; 2]| 0.5 * (high - low) * weight;
-                let limits = [half(foot.stand_y), half(foot.stand_x)];
-                moment = balance.moment(&tilt, &rate, weight * body.stand(swing).com.z, limits);
+                moment = inertial(body, balance, swing, &tilt, sensors);
             }
             Loop::Inclination(lean) => {
                 let com = sensed_com(body, &mut self.sensed, swing.other(), sensors);
@@ -157,14 +154,7 @@ impl Drive {
         command.positions.copy_from_slice(&self.held_angles);
         command.velocities.copy_from_slice(self.dynamics.speeds());
         command.torques.copy_from_slice(&self.dynamics.torques);
-        // A moment on the body is the opposite of one on the foot, which is what the ankle's torque turns.
-        let feet: &[Side] = if both { &[Side::Left, Side::Right] } else { &[swing.other()] };
-        for side in feet {
-            let leg = body.robot.leg(*side);
-            for joint in [leg.ankle_pitch, leg.ankle_roll] {
-                command.torques[joint] -= self.now.axis[joint].dot(&moment) / feet.len() as f64;
-            }
-        }
+        turn_ankles(body, &self.now, &footing, &moment, command);
     }
 
     /// The angles of the newest sample, rad.
@@ -178,7 +168,7 @@ impl Drive {
         for (contact, force) in body.robot.contacts.iter().zip(&sensors.contact_forces) {
             loads[contact.leg as usize] += force;
         }
-        let least = LOADED * body.tree.mass() * 9.81;
+        let least = LOADED * body.tree.mass() * GRAVITY;
         let (mut sum, mut moment) = (0.0, [0.0; 2]);
         let sole = &body.robot.leg(swing.other()).sole;
         let turn = self.now.rotation[sole.link].transpose();
@@ -196,22 +186,55 @@ impl Drive {
         (sum > least).then(|| moment.map(|m| m / sum))
     }
 
-    /// How far the base leans from the plan: a rotation vector in the base frame, rad, without yaw.
-    pub(crate) fn tilt(&self, body: &Body, swing: Side, sensors: &Sensors) -> Vector3<f64> {
-        let sole = &body.robot.leg(swing.other()).sole;
-        up(sensors).cross(&(self.now.rotation[sole.link] * Vector3::z()))
-    }
-
     /// Lean of the body toward the swing foot, rad: tilt, plus rate times the time to fall.
     pub(crate) fn lean(&self, body: &Body, swing: Side, sensors: &Sensors) -> f64 {
-        let fall_time = (body.stand(swing).com.z / 9.81).sqrt();
-        -Body::sign(swing) * (self.tilt(body, swing, sensors).x + fall_time * sensors.gyro[0])
+        let fall_time = (body.stand(swing).com.z / GRAVITY).sqrt();
+        -Body::sign(swing) * (tilt(body, &self.now, swing, sensors).x + fall_time * sensors.gyro[0])
     }
 }
 
 /// The loop of the centre of pressure with `feedback`.
 pub(crate) fn pressure(feedback: Feedback) -> Loop {
     Loop::Pressure(Balance::new(feedback))
+}
+
+/// How far the base leans from the plan, whose pose is `now`: a rotation vector in the base frame, rad, without yaw.
+pub(crate) fn tilt(body: &Body, now: &TreePose, swing: Side, sensors: &Sensors) -> Vector3<f64> {
+    let sole = &body.robot.leg(swing.other()).sole;
+    up(sensors).cross(&(now.rotation[sole.link] * Vector3::z()))
+}
+
+/// The moment of the inertial sensor's loop on the body, in the base frame, N m.
+pub(crate) fn inertial(
+    body: &Body,
+    balance: &Balance,
+    swing: Side,
+    tilt: &Vector3<f64>,
+    sensors: &Sensors,
+) -> Vector3<f64> {
+    let weight = body.tree.mass() * GRAVITY;
+    let foot = &body.feet[swing.other() as usize];
+    let half = |[low, high]: [f64; 2]| 0.5 * (high - low) * weight;
+    let limits = [half(foot.stand_y), half(foot.stand_x)];
+    balance.moment(tilt, &Vector3::from(sensors.gyro), weight * body.stand(swing).com.z, limits)
+}
+
+/// Puts a moment on the body (N m, base frame) by the ankles of the feet that carry it.
+pub(crate) fn turn_ankles(
+    body: &Body,
+    now: &TreePose,
+    footing: &Footing,
+    moment: &Vector3<f64>,
+    command: &mut JointCommand,
+) {
+    // A moment on the body is the opposite of one on the foot, which is what the ankle's torque turns.
+    let feet: &[Side] = if footing.both { &[Side::Left, Side::Right] } else { &[footing.swing.other()] };
+    for side in feet {
+        let leg = body.robot.leg(*side);
+        for joint in [leg.ankle_pitch, leg.ankle_roll] {
+            command.torques[joint] -= now.axis[joint].dot(moment) / feet.len() as f64;
+        }
+    }
 }
 
 /// The vertical in the base frame.

@@ -115,6 +115,11 @@ fn bounds(values: impl Iterator<Item = f64>) -> [f64; 2] {
     values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)])
 }
 
+/// Angle in (-pi, pi].
+pub(crate) fn wrap(angle: f64) -> f64 {
+    angle.sin().atan2(angle.cos())
+}
+
 /// Equation (1) with its corridor: the foot that the paper's rule chooses for a ball at `ball` (m) and a kick toward
 /// `direction` (rad) in the footprint frame; `corridor` is its full width (m).
 #[must_use]

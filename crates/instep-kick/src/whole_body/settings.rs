@@ -1,4 +1,4 @@
-//! Settings that several engines have in their files: the stance, what counts as possible, and the closed loop on the centre of pressure.
+//! Settings that several engines have in their files: how long phases take, the stance, what counts as possible, and the closed loop on the centre of pressure.
 
 use serde::{Deserialize, Serialize};
 
@@ -58,6 +58,26 @@ pub struct Stance {
     pub roll: f64,
 }
 
+/// How long phases take; the strike's times follow from distance and speed.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Times {
+    /// Shift of the weight over the support foot, s.
+    pub shift: f64,
+    /// Pause on the support foot before the foot is raised, s.
+    pub settle: f64,
+    /// Fastest mean speed of the foot outside the strike, m/s.
+    pub foot_speed: f64,
+    /// Least time of a foot motion outside the strike, s.
+    pub foot_least: f64,
+    /// Pause at the wind-up point, s.
+    pub aim: f64,
+    /// Lowering of the foot, s.
+    pub lower: f64,
+    /// Shift of the weight back, s.
+    pub shift_back: f64,
+}
+
 /// What counts as possible.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -80,6 +100,42 @@ pub struct Limits {
     pub edge: f64,
     /// Largest difference from the standing pose with which a kick may start, rad.
     pub stand: f64,
+}
+
+impl Pid {
+    /// Checks every value; `field` is the path of the controller.
+    ///
+    /// # Errors
+    /// Names the first field whose value cannot be.
+    pub fn validate(&self, field: &str) -> Result<(), KickError> {
+        for (part, value, high) in
+            [("p", self.p, 10.0), ("i", self.i, 50.0), ("d", self.d, 5.0), ("limit", self.limit, 0.2)]
+        {
+            within(&format!("{field}.{part}"), value, 0.0, high)?;
+        }
+        Ok(())
+    }
+}
+
+impl Times {
+    /// Checks every value.
+    ///
+    /// # Errors
+    /// Names the first field whose value cannot be.
+    pub fn validate(&self) -> Result<(), KickError> {
+        for (field, value, low, high) in [
+            ("times.shift", self.shift, 0.1, 5.0),
+            ("times.settle", self.settle, 0.0, 5.0),
+            ("times.foot_speed", self.foot_speed, 0.01, 5.0),
+            ("times.foot_least", self.foot_least, 0.02, 5.0),
+            ("times.aim", self.aim, 0.0, 5.0),
+            ("times.lower", self.lower, 0.02, 5.0),
+            ("times.shift_back", self.shift_back, 0.1, 5.0),
+        ] {
+            within(field, value, low, high)?;
+        }
+        Ok(())
+    }
 }
 
 impl Stance {
@@ -141,13 +197,7 @@ impl Feedback {
         ] {
             within(field, value, low, high)?;
         }
-        for (axis, pid) in [("x", &f.x), ("y", &f.y)] {
-            for (part, value, high) in
-                [("p", pid.p, 10.0), ("i", pid.i, 50.0), ("d", pid.d, 5.0), ("limit", pid.limit, 0.2)]
-            {
-                within(&format!("feedback.{axis}.{part}"), value, 0.0, high)?;
-            }
-        }
-        Ok(())
+        f.x.validate("feedback.x")?;
+        f.y.validate("feedback.y")
     }
 }
