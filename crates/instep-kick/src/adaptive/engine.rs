@@ -20,11 +20,11 @@ use crate::adaptive::geometry::{PARTS, Part};
 use crate::adaptive::grid::{CELL, Grid};
 use crate::adaptive::lookup::{Found, Query, look_up};
 use crate::adaptive::motion::{CAREFUL, Stroke, adapted};
-use crate::adaptive::plan::{Planner, check, push};
+use crate::adaptive::plan::{Planner, check, precision, push};
 use crate::adaptive::settings::AdaptiveSettings;
 use crate::adaptive::{GRID_FILE, grid_hash, parts};
 use crate::ball::BallModel;
-use crate::engine::{BreakOff, KickEngine, KickPlan, KickStatus, Phase, Progress};
+use crate::engine::{BreakOff, Face, KickEngine, KickPlan, KickStatus, Phase, Progress};
 use crate::ik::Ik;
 use crate::request::{KickRequest, Place, Refusal, Strength};
 use crate::settings::Settings;
@@ -67,6 +67,19 @@ struct Search {
     ball: Vector2<f64>,
     next: usize,
     best: Option<Found>,
+}
+
+/// The best stroke of the grid for a request.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Outlook {
+    /// The foot that would kick.
+    pub foot: Side,
+    /// Which part of it would strike.
+    pub face: Face,
+    /// The forecast g: cosine of the angle between the foot's way and the wanted direction (paper 3, equation 1).
+    pub forecast: f64,
+    /// Standard deviation of the direction, rad.
+    pub precision: f64,
 }
 
 /// The adaptive kick engine of one robot.
@@ -157,6 +170,25 @@ impl AdaptiveKick {
     #[must_use]
     pub fn settings(&self) -> &AdaptiveSettings {
         &self.settings
+    }
+
+    /// What the grid alone says of `request` with the ball at rest where it is: a fraction of a millisecond, for a caller
+    /// that weighs many places to stand before it plans one. `None` where no foot reaches; a plan may still find that a
+    /// joint is too slow.
+    ///
+    /// # Errors
+    /// When the request holds a number that cannot be.
+    pub fn outlook(&mut self, request: &KickRequest) -> Result<Option<Outlook>, Refusal> {
+        request.check()?;
+        let ball = (request.ball, [0.0; 2]);
+        let found = self.planner.look_up(&self.body, &self.settings, &self.grid, request, ball);
+        let best = found.first().map(|(stroke, _)| Outlook {
+            foot: stroke.swing,
+            face: stroke.face,
+            forecast: stroke.forecast,
+            precision: precision(&self.settings, stroke),
+        });
+        Ok(best)
     }
 
     /// Looks after the ball: another stroke when it has moved, or a break-off. `time` is the motion's at the newest sample.

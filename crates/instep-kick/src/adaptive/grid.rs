@@ -6,7 +6,7 @@
 //! in the grid, as in the paper. A block of 4 x 4 x 4 cells is one word, so that a search can leave out
 //! empty or hopeless blocks at once. A grid knows the hash of the robot and stance that it was measured with.
 
-use std::collections::BinaryHeap;
+use std::collections::{BinaryHeap, HashMap};
 
 use nalgebra::Vector3;
 
@@ -127,11 +127,24 @@ impl Grid {
 
     /// The blocks that are not empty: the first cell and the word of each.
     pub(crate) fn blocks(&self) -> impl Iterator<Item = (Cell, u64)> {
-        self.blocks
-            .iter()
-            .enumerate()
-            .filter(|(_, word)| **word != 0)
-            .map(|(i, word)| ([i % BLOCKS * 4, i / BLOCKS % BLOCKS * 4, i / (BLOCKS * BLOCKS) * 4], *word))
+        self.blocks_in([[0, BLOCKS - 1]; 3])
+    }
+
+    /// The blocks that are not empty and hold a place within `reach` (m) of `point` on every axis.
+    pub(crate) fn blocks_near(&self, point: &Vector3<f64>, reach: f64) -> impl Iterator<Item = (Cell, u64)> {
+        // A cast takes what is outside, and a NaN, to the nearest end.
+        let block = |k: usize, at: f64| (((at - CORNER[k]) / (4.0 * CELL)) as usize).min(BLOCKS - 1);
+        self.blocks_in([0, 1, 2].map(|k| [block(k, point[k] - reach), block(k, point[k] + reach)]))
+    }
+
+    /// The blocks that are not empty between the first and the last on each axis, x fastest, then y, then z.
+    fn blocks_in(&self, [x, y, z]: [[usize; 2]; 3]) -> impl Iterator<Item = (Cell, u64)> {
+        let rows = (z[0]..=z[1]).flat_map(move |k| (y[0]..=y[1]).map(move |j| (k, j)));
+        rows.flat_map(move |(k, j)| {
+            let start = (k * BLOCKS + j) * BLOCKS;
+            let row = self.blocks[start + x[0]..=start + x[1]].iter().zip(x[0]..);
+            row.filter(|(word, _)| **word != 0).map(move |(word, i)| ([4 * i, 4 * j, 4 * k], *word))
+        })
     }
 
     /// The cell of a bit of the block whose first cell is `first`.
@@ -158,27 +171,24 @@ impl Grid {
             return Some(vec![*from, *to]);
         }
         let (start, goal) = (Self::cell(from).filter(|c| self.has(*c))?, Self::cell(to).filter(|c| self.has(*c))?);
-        let index = |[x, y, z]: Cell| (z * CELLS + y) * CELLS + x;
         let apart = |a: Cell, b: Cell| (Self::centre(a) - Self::centre(b)).norm();
-        let mut best = vec![f64::INFINITY; CELLS * CELLS * CELLS];
-        let mut before: Vec<Option<Cell>> = vec![None; CELLS * CELLS * CELLS];
+        // Length of the best way to each cell that was seen, and the cell before it: a small part of the grid.
+        let mut best = HashMap::from([(start, (0.0, start))]);
         let mut open = BinaryHeap::new();
-        best[index(start)] = 0.0;
         open.push((std::cmp::Reverse(micro(apart(start, goal))), start));
         while let Some((_, cell)) = open.pop() {
             if cell == goal {
                 break;
             }
-            let length = best[index(cell)];
+            let (length, _) = *best.get(&cell)?;
             for step in 0..27 {
                 let next: [usize; 3] = [0, 1, 2].map(|k| (cell[k] + step / 3_usize.pow(k as u32) % 3).wrapping_sub(1));
                 if next.iter().any(|i| *i >= CELLS) || !self.has(next) {
                     continue;
                 }
                 let new = length + apart(cell, next);
-                if new + 1e-12 < best[index(next)] {
-                    best[index(next)] = new;
-                    before[index(next)] = Some(cell);
+                if best.get(&next).is_none_or(|(known, _)| new + 1e-12 < *known) {
+                    best.insert(next, (new, cell));
                     open.push((std::cmp::Reverse(micro(new + apart(next, goal))), next));
                 }
             }
@@ -186,7 +196,7 @@ impl Grid {
         let mut way = vec![*to];
         let mut cell = goal;
         while cell != start {
-            cell = before[index(cell)]?;
+            cell = best.get(&cell)?.1;
             way.push(if cell == start { *from } else { Self::centre(cell) });
         }
         way.reverse();

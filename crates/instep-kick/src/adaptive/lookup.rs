@@ -64,8 +64,8 @@ pub(crate) fn look_up(
         if !grid.contains(&mirror(&contact)) {
             return None;
         }
-        let wanted =
-            Wanted { target: contact, direction: wanted_way, delta: k.delta, range: k.retraction, floor: k.sole_least };
+        let range = [k.retraction[0], query.retraction];
+        let wanted = Wanted { target: contact, direction: wanted_way, delta: k.delta, range, floor: k.sole_least };
         let best = wanted.search(grid, mirror)?;
         // The cell's centre is up to half a cell off the wanted line: drawn onto it where that is in reach.
         let on_line = contact - wanted_way * (contact - best.point).dot(&wanted_way).max(k.retraction[0]);
@@ -139,10 +139,49 @@ pub(crate) fn look_up_all(
     found: &mut Vec<Found>,
 ) {
     let parts = if settings.kick.true_shape { PARTS } else { 1 };
-    // A point that is less far back is easier on the joints.
     let [least, most] = settings.kick.retraction;
-    for share in [1.0, 0.5, 0.0] {
-        let query = Query { retraction: least + CELL + share * (most - least - CELL).max(0.0), ..*query };
-        found.extend((0..parts).filter_map(|i| look_up(body, settings, grid, &query, &Part::of(i), true)));
+    for part in (0..parts).map(Part::of) {
+        let mut last = f64::INFINITY;
+        // A point that is less far back is easier on the joints.
+        for share in [1.0, 0.5, 0.0] {
+            let query = Query { retraction: least + CELL + share * (most - least - CELL).max(0.0), ..*query };
+            // The best of all points that is among the nearer ones is the best of these.
+            if last <= query.retraction {
+                continue;
+            }
+            if let Some(next) = look_up(body, settings, grid, &query, &part, true) {
+                last = next.0.run();
+                found.push(next);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::adaptive::{load_grid, parts};
+    use crate::ball::BallModel;
+    use crate::settings::Settings;
+
+    #[test]
+    fn the_foot_goes_no_farther_back_than_it_may() {
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots/nao");
+        let robot = std::sync::Arc::new(instep_robot::Robot::load(&folder).unwrap());
+        let settings = AdaptiveSettings::load(&folder).unwrap();
+        let (body, _) = parts(robot, BallModel::load(&folder).unwrap(), &settings).unwrap();
+        let grid = load_grid(&folder).unwrap();
+        let swing = Side::Right;
+        let runs: Vec<f64> = [0.03, 0.05, 0.08]
+            .iter()
+            .map(|&retraction| {
+                let ball = body.support_from_footprint(swing, [0.16, -0.05]).into();
+                let query = Query { swing, ball, direction: 0.0, speed: 1.0, follow: 0.04, retraction };
+                let (stroke, _) = look_up(&body, &settings, &grid, &query, &Part::of(0), false).unwrap();
+                assert!(stroke.run() <= retraction, "{} m of {retraction}", stroke.run());
+                stroke.run()
+            })
+            .collect();
+        assert!(runs[0] < runs[1] && runs[1] < runs[2], "{runs:?}");
     }
 }

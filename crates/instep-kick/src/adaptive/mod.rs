@@ -31,7 +31,7 @@ use crate::whole_body::drive::{Drive, Loop, pressure};
 use crate::whole_body::inclination::Lean;
 use crate::whole_body::torque::Dynamics;
 
-pub use engine::{AdaptiveKick, load_grid};
+pub use engine::{AdaptiveKick, Outlook, load_grid};
 pub use grid::Grid;
 pub use settings::{Accuracy, AdaptiveSettings, Kick, Stabiliser};
 

@@ -24,6 +24,8 @@ use crate::whole_body::torque::Dynamics;
 
 /// Strokes whose whole way is forecast.
 const FORECASTS: usize = 14;
+/// The same where many plans are compared.
+const FEW_FORECASTS: usize = 3;
 /// Cost of slowing a stroke down by its whole speed, or its retraction by its whole time.
 const SLOW_COST: f64 = 0.5;
 /// Share of the joints' speeds that retraction and way back may take: there is time, and a leg that swings freely overshoots.
@@ -44,8 +46,9 @@ const ON_TIME: f64 = 0.02;
 /// Grid steps of a search for the nearest reachable request: ball, m, and direction, rad.
 const NEAREST_BALL: f64 = 0.02;
 const NEAREST_DIRECTION: f64 = 0.175;
-/// Whole plans that such a search may take.
-const NEAREST_PLANS: usize = 8;
+/// Whole plans that such a search may take, and after them those along the way to an easy request.
+const NEAREST_PLANS: usize = 16;
+const EASIER: u32 = 10;
 
 /// A motion that was forecast to be possible.
 #[derive(Debug, Clone, Copy)]
@@ -110,7 +113,8 @@ impl Planner {
         request: &KickRequest,
     ) -> Result<Planned, Refusal> {
         if Vector2::from(request.ball_velocity).norm() < 0.02 {
-            return Ok(self.plan_at(body, settings, grid, request, (request.ball, [0.0; 2]), 0.0)?.0);
+            let ball = (request.ball, [0.0; 2]);
+            return Ok(self.plan_at(body, settings, grid, request, ball, 0.0, FORECASTS)?.0);
         }
         let t = &settings.times;
         let soonest = t.shift + t.settle + 2.0 * t.foot_least + t.aim + 0.3;
@@ -120,7 +124,7 @@ impl Planner {
         for i in 0..=(settings.kick.wait / WAIT_STEP) as usize {
             let at = soonest + i as f64 * WAIT_STEP;
             let ball = body.ball.roll(request.ball, request.ball_velocity, at);
-            match self.plan_at(body, settings, grid, request, ball, at) {
+            match self.plan_at(body, settings, grid, request, ball, at, FEW_FORECASTS) {
                 // A foot that comes later than the ball misses it.
                 Ok((planned, _)) if planned.plan.contact > at + ON_TIME => {}
                 Ok((planned, cost)) => {
@@ -139,19 +143,16 @@ impl Planner {
             .ok_or_else(|| refusal.unwrap_or(Refusal::OutsideGrid { foot: request.foot, nearest: None }))
     }
 
-    /// Plans for a ball that is at a place (m) with a velocity (m/s) at the contact, which is to be at `at` (s; 0: as
-    /// soon as can be).
-    fn plan_at(
+    /// All strokes of the grid for a ball that is at a place (m) with a velocity (m/s) at the contact, best first.
+    pub(crate) fn look_up(
         &mut self,
         body: &Body,
         settings: &AdaptiveSettings,
         grid: &Grid,
         request: &KickRequest,
         (ball, velocity): ([f64; 2], [f64; 2]),
-        at: f64,
-    ) -> Result<(Planned, f64), Refusal> {
-        let mut found = std::mem::take(&mut self.found);
-        found.clear();
+    ) -> &[Found] {
+        self.found.clear();
         let wanted = request.strength.ball_speed(&body.ball, 1.0);
         let aim = push(request.direction, wanted, velocity.into());
         for swing in [Side::Left, Side::Right] {
@@ -166,13 +167,28 @@ impl Planner {
                 follow: settings.kick.follow,
                 retraction: settings.kick.retraction[1],
             };
-            look_up_all(body, settings, grid, &query, &mut found);
+            look_up_all(body, settings, grid, &query, &mut self.found);
         }
-        found.sort_by(|a, b| a.1.total_cmp(&b.1));
+        self.found.sort_by(|a, b| a.1.total_cmp(&b.1));
+        &self.found
+    }
+
+    /// Plans for a ball that is at a place (m) with a velocity (m/s) at the contact, which is to be at `at` (s; 0: as
+    /// soon as can be), by the best of at most `most` strokes.
+    fn plan_at(
+        &mut self,
+        body: &Body,
+        settings: &AdaptiveSettings,
+        grid: &Grid,
+        request: &KickRequest,
+        (ball, velocity): ([f64; 2], [f64; 2]),
+        at: f64,
+        most: usize,
+    ) -> Result<(Planned, f64), Refusal> {
+        self.look_up(body, settings, grid, request, (ball, velocity));
+        let found = std::mem::take(&mut self.found);
         let mut refusal = None;
         let mut forecasts = 0;
-        // Of several times of contact each gets fewer.
-        let most = if at > 0.0 { FORECASTS / 4 } else { FORECASTS };
         let mut best: Option<(Planned, f64)> = None;
         for (stroke, cost) in &found {
             // Nothing that follows can be better than what is known.
@@ -338,13 +354,15 @@ impl Planner {
             }
         }
         steps.sort_by_key(|[x, y, turn]| (x * x + y * y + turn * turn, turn.abs(), x.abs(), *x, *y, *turn));
+        let mut tries = |ball: [f64; 2], direction: f64| {
+            let asked = KickRequest { ball, direction, ball_velocity: [0.0; 2], hold: false, ..*request };
+            self.plan_at(body, settings, grid, &asked, (ball, [0.0; 2]), 0.0, FEW_FORECASTS).map(|_| (ball, direction))
+        };
         let mut plans = 0;
         for [x, y, turn] in steps {
             let ball = [request.ball[0] + f64::from(x) * NEAREST_BALL, request.ball[1] + f64::from(y) * NEAREST_BALL];
-            let direction = wrap(request.direction + f64::from(turn) * NEAREST_DIRECTION);
-            let asked = KickRequest { ball, direction, ball_velocity: [0.0; 2], hold: false, ..*request };
-            match self.plan_at(body, settings, grid, &asked, (ball, [0.0; 2]), 0.0) {
-                Ok(_) => return Some((ball, direction)),
+            match tries(ball, wrap(request.direction + f64::from(turn) * NEAREST_DIRECTION)) {
+                Ok(nearest) => return Some(nearest),
                 Err(Refusal::OutsideGrid { .. }) => {}
                 Err(_) => plans += 1,
             }
@@ -352,7 +370,15 @@ impl Planner {
                 break;
             }
         }
-        None
+        // In front of the nearer foot, straight ahead.
+        let side = if request.ball[1] < 0.0 { -1.0 } else { 1.0 };
+        let gap = 0.5 * (settings.kick.retraction[0] + settings.kick.retraction[1]);
+        let easy = [body.feet[0].outline_x[1] + body.ball.radius + gap, side * body.half_width];
+        (1..=EASIER).find_map(|i| {
+            let share = f64::from(i) / f64::from(EASIER);
+            let ball = [0, 1].map(|k| request.ball[k] + share * (easy[k] - request.ball[k]));
+            tries(ball, (1.0 - share) * wrap(request.direction)).ok()
+        })
     }
 }
 
@@ -380,10 +406,10 @@ pub(crate) fn check(
 /// Stated standard deviation of the direction, rad.
 pub(crate) fn precision(settings: &AdaptiveSettings, stroke: &Stroke) -> f64 {
     let a = &settings.accuracy;
-    let least = match stroke.face {
+    let [base, slope] = match stroke.face {
         Face::Front => a.front,
         Face::Inner | Face::Outer | Face::Back => a.side,
         Face::Corner => a.corner,
     };
-    least + a.angle * stroke.forecast.clamp(-1.0, 1.0).acos()
+    (base + slope * stroke.yaw.abs()).max(0.0) + a.angle * stroke.forecast.clamp(-1.0, 1.0).acos()
 }

@@ -72,10 +72,11 @@ impl Wanted {
             return f64::NEG_INFINITY;
         }
         let length = (apart + RADIUS).min(self.range[1]);
-        let cosine = if apart > RADIUS {
-            // The least angle to any point of the sphere.
-            let angle = (way.dot(&self.direction) / apart).clamp(-1.0, 1.0).acos() - (RADIUS / apart).asin();
-            angle.max(0.0).cos()
+        // Cosine of the least angle to any point of the sphere: that to its middle less the half angle that it fills.
+        let (middle, sine) = (way.dot(&self.direction) / apart, RADIUS / apart);
+        let half = (1.0 - sine * sine).max(0.0).sqrt();
+        let cosine = if sine < 1.0 && middle < half {
+            middle * half + (1.0 - middle * middle).max(0.0).sqrt() * sine
         } else {
             1.0
         };
@@ -93,25 +94,26 @@ impl Wanted {
 
     fn search_measured(&self, grid: &Grid) -> Option<Retraction> {
         let mut best: Option<(f64, Cell)> = None;
-        // The blocks along the wanted way come first: they leave out most of the others.
-        let seed = self.target - self.direction * self.range[1];
-        let near = |first: Cell| (Grid::centre(first).add_scalar(1.5 * CELL) - seed).norm() < 5.0 * CELL;
-        for along in [true, false] {
-            for (first, word) in grid.blocks().filter(|(first, _)| near(*first) == along) {
-                if best.is_some_and(|(value, _)| self.bound(first) < value) {
-                    continue;
-                }
-                let mut bits = word;
-                while bits != 0 {
-                    let cell = Grid::cell_of(first, bits.trailing_zeros());
-                    bits &= bits - 1;
-                    let Some(value) = self.value(&Grid::centre(cell)) else { continue };
-                    let better =
-                        best.is_none_or(|(most, at)| value > most || (value == most && order(cell) < order(at)));
-                    if better {
-                        best = Some((value, cell));
-                    }
-                }
+        let look = |cell: Cell, best: &mut Option<(f64, Cell)>| {
+            let Some(value) = self.value(&Grid::centre(cell)) else { return };
+            if best.is_none_or(|(most, at)| value > most || (value == most && order(cell) < order(at))) {
+                *best = Some((value, cell));
+            }
+        };
+        // The cells along the wanted way come first: they leave out most of the blocks.
+        let steps = (self.range[1] / CELL).ceil() as usize;
+        let way = (0..steps).map(|i| self.target - self.direction * (self.range[1] - i as f64 * CELL));
+        way.filter_map(|point| Grid::cell(&point))
+            .filter(|cell| grid.has(*cell))
+            .for_each(|cell| look(cell, &mut best));
+        for (first, word) in grid.blocks_near(&self.target, self.range[1]) {
+            if best.is_some_and(|(value, _)| self.bound(first) < value) {
+                continue;
+            }
+            let mut bits = word;
+            while bits != 0 {
+                look(Grid::cell_of(first, bits.trailing_zeros()), &mut best);
+                bits &= bits - 1;
             }
         }
         best.map(|(value, cell)| {

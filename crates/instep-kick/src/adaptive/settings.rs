@@ -30,7 +30,7 @@ pub struct AdaptiveSettings {
     pub arms: BTreeMap<String, f64>,
     /// What counts as possible.
     pub limits: Limits,
-    /// What the forecast g says of the direction.
+    /// How far the direction may be off.
     pub accuracy: Accuracy,
     /// What keeps the robot upright.
     pub stabiliser: Stabiliser,
@@ -85,17 +85,17 @@ pub struct Kick {
     pub wait: f64,
 }
 
-/// What the forecast g says of the direction: the stated standard deviation is base + angle * acos(g), rad. Measured
-/// with KickBench.
+/// How far the direction may be off: the stated standard deviation is base + slope |yaw| + angle acos(g), rad, with the
+/// foot's yaw and the forecast g. Base (rad) and slope of each part of the foot are measured with KickBench's `sweep`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Accuracy {
-    /// Of a kick whose foot moves along the wanted direction, with the front of the foot, rad.
-    pub front: f64,
-    /// The same with a side of the foot, rad.
-    pub side: f64,
-    /// The same with a corner of the foot, rad.
-    pub corner: f64,
+    /// With the front of the foot: base and slope.
+    pub front: [f64; 2],
+    /// The same with a side of the foot.
+    pub side: [f64; 2],
+    /// The same with a corner of the foot.
+    pub corner: [f64; 2],
     /// Share of the angle between the foot's way and the wanted direction.
     pub angle: f64,
 }
@@ -130,9 +130,12 @@ impl Settings for AdaptiveSettings {
             ("kick.speed_gain", k.speed_gain, 0.3, 3.0),
             ("kick.wait", k.wait, 0.0, 60.0),
             ("kick.speed_least", k.speed_least, 0.0, 1.0),
-            ("accuracy.front", a.front, 0.0, 3.2),
-            ("accuracy.side", a.side, 0.0, 3.2),
-            ("accuracy.corner", a.corner, 0.0, 3.2),
+            ("accuracy.front[0]", a.front[0], 0.0, 3.2),
+            ("accuracy.front[1]", a.front[1], -1.0, 1.0),
+            ("accuracy.side[0]", a.side[0], 0.0, 3.2),
+            ("accuracy.side[1]", a.side[1], -1.0, 1.0),
+            ("accuracy.corner[0]", a.corner[0], 0.0, 3.2),
+            ("accuracy.corner[1]", a.corner[1], -1.0, 1.0),
             ("accuracy.angle", a.angle, 0.0, 3.2),
         ] {
             within(field, value, low, high)?;
