@@ -152,6 +152,20 @@ impl Tree {
         (1..self.links.len()).filter(|&link| joints.iter().any(|&joint| self.moves[joint][link])).collect()
     }
 
+    /// `links` and those that carry them, parents first: all that [`Tree::place`] needs to place these.
+    #[must_use]
+    pub fn links_carrying(&self, links: &[usize]) -> Vec<usize> {
+        let mut needed = vec![false; self.links.len()];
+        for &link in links {
+            let mut at = link;
+            while at != 0 {
+                needed[at] = true;
+                at = self.links[at].parent;
+            }
+        }
+        (1..self.links.len()).filter(|&link| needed[link]).collect()
+    }
+
     /// Computes all of `pose` for the joint angles (rad).
     pub fn update(&self, angles: &[f64], pose: &mut TreePose) {
         self.place(1..self.links.len(), angles, pose);
@@ -164,7 +178,8 @@ impl Tree {
         self.weigh(pose);
     }
 
-    fn place(&self, links: impl Iterator<Item = usize>, angles: &[f64], pose: &mut TreePose) {
+    /// Places `links` alone, parents first, in `pose`: positions, rotations, joint axes and anchors, no subtree's mass.
+    pub fn place(&self, links: impl Iterator<Item = usize>, angles: &[f64], pose: &mut TreePose) {
         for b in links {
             let link = &self.links[b];
             let (mut position, mut rotation) = if b == self.base {

@@ -24,8 +24,9 @@ use crate::reward::{self, Deviation};
 use crate::settings::LearnSettings;
 use crate::termination::{End, part};
 
-/// Where the ball lies while there is none, m.
-const NO_BALL: [f64; 3] = [60.0, 0.0, 0.11];
+/// Where the ball is while there is none, m: so high that an episode is over before it lands, and no step has to solve its
+/// contact with the ground.
+const NO_BALL: [f64; 3] = [60.0, 0.0, 1000.0];
 /// How long before the contact an episode must start for the ball to be there, s.
 const BALL_LEAD: f64 = 0.1;
 /// Least speed of a ball that has been kicked, m/s.
@@ -118,7 +119,7 @@ impl Scene {
     /// When it cannot be made.
     pub fn world(&self) -> Result<World, LearnError> {
         let mut world = World::new(Arc::clone(&self.robot), &self.world_settings())?;
-        world.set_solver(self.settings.world.solver_iterations, self.settings.world.solver_tolerance);
+        world.make_cheap(self.settings.world.solver_iterations, self.settings.world.solver_tolerance);
         Ok(world)
     }
 

@@ -14,7 +14,9 @@ use crate::mlp::{Batch, Mlp, Tape};
 use crate::settings::{NetworkSettings, PpoSettings};
 
 /// Samples of a gradient that are computed together; the order of the sums, and so every byte, follows from it.
-const CHUNK: usize = 256;
+const CHUNK: usize = 512;
+/// Entries of a gradient that are summed together.
+const SUM: usize = 1 << 13;
 
 /// What environments bring: one column or entry a sample.
 #[derive(Debug, Clone, Default)]
@@ -42,6 +44,18 @@ impl Samples {
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.returns.is_empty()
+    }
+
+    /// Room for `count` samples with observations and actions of these lengths.
+    #[must_use]
+    pub fn with_capacity(count: usize, observations: usize, actions: usize) -> Self {
+        Self {
+            observations: Vec::with_capacity(count * observations),
+            actions: Vec::with_capacity(count * actions),
+            means: Vec::with_capacity(count * actions),
+            advantages: Vec::with_capacity(count),
+            returns: Vec::with_capacity(count),
+        }
     }
 
     /// Adds other samples behind these.
@@ -166,12 +180,14 @@ impl Ppo {
             chosen.par_chunks(CHUNK).map(|chunk| self.chunk_gradient(samples, chunk, old_sigmas)).collect();
         let mut gradient = vec![0.0; self.weights.flat.len()];
         let mut sums = Sums::default();
-        for (part, told) in chunks {
-            gradient.iter_mut().zip(&part).for_each(|(total, g)| *total += g);
-            sums.add(&told);
-        }
+        chunks.iter().for_each(|(_, told)| sums.add(told));
         let scale = 1.0 / chosen.len() as f32;
-        gradient.iter_mut().for_each(|g| *g *= scale);
+        gradient.par_chunks_mut(SUM).enumerate().for_each(|(k, totals)| {
+            for (part, _) in &chunks {
+                totals.iter_mut().zip(&part[k * SUM..]).for_each(|(total, g)| *total += g);
+            }
+            totals.iter_mut().for_each(|g| *g *= scale);
+        });
         let entropy = self.settings.entropy as f32;
         gradient[self.weights.sigma_part()].iter_mut().for_each(|g| *g -= entropy);
         (gradient, sums)
@@ -182,7 +198,10 @@ impl Ppo {
         let (n, count) = (weights.actions, chunk.len());
         let width = samples.observations.len() / samples.len();
         let row = |values: &[f32], width: usize, i: usize, k: usize| values[chunk[i] * width + k];
-        let input = Batch::from_fn(width, count, |k, i| row(&samples.observations, width, i, k));
+        let mut input = Batch::zeros(width, count);
+        for (column, &sample) in input.as_mut_slice().chunks_exact_mut(width).zip(chunk) {
+            column.copy_from_slice(&samples.observations[sample * width..][..width]);
+        }
         let (mut actor, mut critic) = (Tape::default(), Tape::default());
         weights.actor.forward(&weights.flat[weights.actor_part()], &input, &mut actor);
         weights.critic.forward(&weights.flat[weights.critic_part()], &input, &mut critic);

@@ -227,7 +227,9 @@ impl Rollout {
             .par_iter_mut()
             .map(|group| group.collect(scene, starts, weights, &normalizer, threshold))
             .collect::<Result<Vec<_>, _>>()?;
-        let (mut samples, mut told) = (Samples::default(), Told::default());
+        let count = parts.iter().map(|(part, _, _)| part.len()).sum();
+        let mut samples = Samples::with_capacity(count, normalizer.mean.len(), weights.actions);
+        let mut told = Told::default();
         for (mut part, part_told, part_moments) in parts {
             samples.append(&mut part);
             told.merge(&part_told);
@@ -277,7 +279,7 @@ impl Group {
         let mut input = Batch::zeros(width, count);
         let (mut actor, mut critic) = (Tape::default(), Tape::default());
         let mut lines = vec![Line::default(); count];
-        let mut rows: Vec<Samples> = vec![Samples::default(); count];
+        let mut rows: Vec<Samples> = (0..count).map(|_| Samples::with_capacity(ppo.horizon, width, n)).collect();
         let scale = 1.0 - ppo.gamma;
         for _ in 0..ppo.horizon {
             for (i, environment) in self.environments.iter().enumerate() {
@@ -331,7 +333,7 @@ impl Group {
                 *last = Some(value(weights, normalizer, environment.observation()));
             }
         }
-        let mut samples = Samples::default();
+        let mut samples = Samples::with_capacity(count * ppo.horizon, width, n);
         for (mut row, line) in rows.into_iter().zip(&lines) {
             line.advantages(ppo.gamma, ppo.lambda, &mut row);
             samples.append(&mut row);

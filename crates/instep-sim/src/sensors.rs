@@ -18,6 +18,8 @@ const LOADED: f64 = 1.0;
 #[derive(Debug, Clone)]
 pub struct SensorSuite {
     noise: SensorNoise,
+    /// Whether any reading is noisy.
+    noisy: bool,
     rng: ChaCha8Rng,
     /// Readings of the last far steps, the newest at `newest`; as many as the longest delay needs.
     history: Vec<Sensors>,
@@ -46,6 +48,7 @@ impl SensorSuite {
         };
         Self {
             noise,
+            noisy: SensorNoise { delay: 0.0, ball_delay: 0.0, ..noise } != SensorNoise::default(),
             rng: ChaCha8Rng::seed_from_u64(seed),
             history: vec![blank; ball_delay.max(delay) + 1],
             newest: 0,
@@ -60,6 +63,9 @@ impl SensorSuite {
     pub fn sense(&mut self, world: &World) {
         let first = self.imu_velocity.is_none();
         let mut draw = |deviation: f64| {
+            if !self.noisy {
+                return 0.0;
+            }
             let sample: f64 = StandardNormal.sample(&mut self.rng);
             deviation * sample
         };

@@ -25,6 +25,8 @@ const GRAVITY: f64 = 9.81;
 pub struct Odometry {
     tree: Tree,
     pose: TreePose,
+    /// The links between the base and the contact points.
+    links: Vec<usize>,
     contacts: Vec<(LinkPoint, f64)>,
     /// For each contact point, its joints.
     movers: Vec<Vec<usize>>,
@@ -50,6 +52,7 @@ impl Odometry {
             .collect();
         Self {
             pose: tree.pose(),
+            links: tree.links_carrying(&contacts.iter().map(|(at, _)| at.link).collect::<Vec<_>>()),
             tree,
             movers,
             imu: robot.imu.point,
@@ -84,7 +87,7 @@ impl Odometry {
         self.position += (before + self.velocity) * (0.5 * dt);
         self.lever = Some(lever);
 
-        self.tree.update(&sensors.joint_positions, &mut self.pose);
+        self.tree.place(self.links.iter().copied(), &sensors.joint_positions, &mut self.pose);
         let (mut load, mut position, mut velocity) = (0.0, Vector3::zeros(), Vector3::zeros());
         for (c, (at, radius)) in self.contacts.iter().enumerate() {
             let force = sensors.contact_forces[c];
