@@ -185,6 +185,8 @@ pub struct Environment {
     tick: usize,
     started: usize,
     with_ball: bool,
+    /// When the ball was first seen to move, in policy steps.
+    moving: Option<usize>,
     last_action: Vec<f32>,
     observation: Vec<f32>,
 }
@@ -209,6 +211,7 @@ impl Environment {
             tick: 0,
             started: 0,
             with_ball: false,
+            moving: None,
             last_action: vec![0.0; follower.action_len()],
             observation: vec![0.0; follower.observation_len()],
             follower,
@@ -256,7 +259,7 @@ impl Environment {
         let seed = self.rng.random();
         self.suite = SensorSuite::new(&self.world, seed);
         self.suite.sense(&self.world);
-        (self.tick, self.started) = (tick, tick);
+        (self.tick, self.started, self.moving) = (tick, tick, None);
         self.last_action.fill(0.0);
         let (position, velocity) = (Vector3::new(q[0], q[1], q[2]), Vector3::new(v[0], v[1], v[2]));
         self.follower.start(0.0, at, position, velocity);
@@ -304,8 +307,12 @@ impl Environment {
         self.last_action.copy_from_slice(action);
         if self.with_ball && weights.w_ball > 0.0 {
             let velocity = Vector3::from(self.world.ball().velocity);
-            if velocity.norm() > KICKED {
+            // A contact is over within the step after the one in which the ball was first seen to move.
+            if self.moving == Some(self.tick - 1) {
                 reward += reward::ball(weights, &velocity, &Vector3::x());
+            }
+            if velocity.norm() > KICKED {
+                self.moving = self.moving.or(Some(self.tick));
             }
         }
         let ret = settings.termination.ret;

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use instep_kick::policy::{Policy, PolicyKick};
 use instep_robot::Robot;
 use instep_sim::settings::WorldSettings;
-use instep_sim::trial::{self, Trial, TrialSettings};
+use instep_sim::trial::{self, LimitViolation, Trial, TrialSettings};
 use instep_sim::{BallState, World};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -66,6 +66,8 @@ pub struct Tried {
     pub audit_invalid: bool,
     /// Joints beyond a torque or speed limit.
     pub limit_violations: usize,
+    /// Which, how far and when.
+    pub beyond: Vec<LimitViolation>,
 }
 
 /// What came of all.
@@ -206,6 +208,7 @@ fn attempt(
         fell_at: trial.fell_at,
         audit_invalid: hit && !valid,
         limit_violations: trial.limit_violations.len(),
+        beyond: trial.limit_violations,
     })
 }
 

@@ -70,7 +70,8 @@ pub struct RewardSettings {
     /// Penalty on joint speeds beyond [`CLOSE_TO_LIMIT`](crate::reward::CLOSE_TO_LIMIT), which a landing can drive past
     /// what the motor gives; not in the paper, zero turns it off.
     pub w_limit: f64,
-    /// w_ball of (38), per step after the kick; zero while only tracking.
+    /// w_ball of (38), once, as the ball leaves; zero while only tracking. The paper pays it at every step after the kick: by
+    /// then nothing can be done for it, no observation tells it, and it is noise in the advantage of every later step.
     pub w_ball: f64,
     /// Speed that the exponent of (38) is divided by, m/s. The paper has 1, which at 11 m/s is e^11 a step.
     pub ball_scale: f64,
@@ -279,7 +280,7 @@ impl LearnSettings {
     #[must_use]
     pub fn ball() -> Self {
         Self {
-            reward: RewardSettings { w_ball: 0.3, ..RewardSettings::default() },
+            reward: RewardSettings { w_ball: 20.0, ..RewardSettings::default() },
             termination: TerminationSettings { d_max: 0.4, d_min: 0.4, ..TerminationSettings::default() },
             start: StartSettings { first: 0.5, ..StartSettings::default() },
             ppo: PpoSettings { sigma: 0.15, warm_up: 10, ..PpoSettings::default() },
