@@ -139,6 +139,31 @@ fn without_early_termination_only_a_fall_ends_an_episode() {
 }
 
 #[test]
+fn a_kicked_ball_is_paid_for_once() {
+    let (robot, reference) = prestoe();
+    let still = vec![0.0; robot.joints.len()];
+    // The same kick with and without the ball's reward; the reference's own torques bring the foot from the swing to the ball.
+    let rewards = [0.0, 20.0].map(|w_ball| {
+        let mut settings = small();
+        (settings.world.ball, settings.reward.w_ball) = (true, w_ball);
+        let scene = Arc::new(Scene::new(Arc::clone(&robot), Arc::clone(&reference), settings).unwrap());
+        let contact = (scene.follower().track().contact_time() / scene.settings.follower.period) as usize;
+        let mut environment = Environment::new(scene, 1, 0).unwrap();
+        environment.start(contact - 8).unwrap();
+        (0..30).map(|_| environment.step(&still, 10.0).reward).collect::<Vec<_>>()
+    });
+    let paid: Vec<(usize, f64)> = rewards[1]
+        .iter()
+        .zip(&rewards[0])
+        .map(|(with, without)| with - without)
+        .enumerate()
+        .filter(|(_, p)| *p != 0.0)
+        .collect();
+    assert_eq!(paid.len(), 1, "{paid:?}");
+    assert!((8..14).contains(&paid[0].0) && paid[0].1 > 5.0, "{paid:?}");
+}
+
+#[test]
 fn an_evaluation_is_the_same_twice_and_counts_what_it_says() {
     let (robot, _) = prestoe();
     let policy = training(small()).policy();
