@@ -131,7 +131,12 @@ pub fn run_cell(subject: &Subject, scenario: &Scenario, key: &CellKey) -> Result
     let mut plan_times = Vec::with_capacity(key.requests);
     let mut outcomes = Vec::with_capacity(key.requests);
     let mut shared: Option<World> = None;
-    for case in scenario.cases(&subject.size, key.seed, key.requests) {
+    let (seed, count) = (key.seed, key.requests);
+    let cases = match subject.engine(&key.engine)?.own_start() {
+        Some(start) => scenario.cases_about(&start.request, &subject.size, seed, count),
+        None => scenario.cases(&subject.size, seed, count),
+    };
+    for case in cases {
         let mut engine = subject.engine(&key.engine)?;
         let world = match &mut shared {
             Some(world) if !scenario.varies_world() => world,
@@ -175,7 +180,7 @@ pub struct Ran {
 /// The outcome of a case, the time of its plan (s), and what an accepted request led to.
 pub type Tried = (Result<Kicked, Refusal>, f64, Option<Ran>);
 
-/// Plans and tries one case. Gives the outcome, the time of the plan (s) and what an accepted request led to.
+/// Plans and tries one case, from the stand or from where the engine says that its kicks start. Gives the outcome, the time of the plan (s) and what an accepted request led to.
 ///
 /// # Errors
 /// When the simulation diverges.
@@ -187,13 +192,16 @@ pub fn run_case(
     ticks: &mut Vec<f32>,
 ) -> Result<Tried, BenchError> {
     let robot = &subject.robot;
-    let on_ground = |[x, y]: [f64; 2]| [x + subject.footprint[0], y + subject.footprint[1], subject.size.ball];
+    let (q, v, footprint) = match engine.own_start() {
+        Some(start) => (start.q, start.v, start.footprint),
+        None => (robot.stand.clone(), vec![0.0; robot.nv()], subject.footprint),
+    };
+    let on_ground = |[x, y]: [f64; 2]| [x + footprint[0], y + footprint[1], subject.size.ball];
     let mut ball = BallState::at_rest(on_ground(case.ball));
     let [vx, vy] = case.ball_velocity;
     ball.velocity = [vx, vy, 0.0];
     ball.angular_velocity = [-vy / subject.size.ball, vx / subject.size.ball, 0.0];
-    let still = vec![0.0; robot.nv()];
-    world.reset(&robot.stand, &still, &ball)?;
+    world.reset(&q, &v, &ball)?;
     let mut suite = SensorSuite::new(world, case.seed);
     suite.sense(world);
     let mut sensors = Sensors::default();
@@ -222,8 +230,8 @@ pub fn run_case(
         seed: case.seed,
         duration: plan.duration + AFTER,
         control_period: engine.control_period(),
-        q: robot.stand.clone(),
-        v: still,
+        q,
+        v,
         ball,
         direction: case.request.direction,
     };

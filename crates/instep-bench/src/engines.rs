@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use instep_kick::adaptive::{AdaptiveKick, AdaptiveSettings, Stabiliser, load_grid};
 use instep_kick::dynamic::{DynamicKick, DynamicSettings};
+use instep_kick::policy::{LearnedKick, PolicySettings};
 use instep_kick::preview::{PreviewKick, PreviewSettings};
 use instep_kick::{BallModel, KickEngine, Settings};
 use instep_robot::Robot;
@@ -68,17 +69,18 @@ const ENTRIES: &[Entry] = &[
             subject.adaptive(file, text, |settings| settings.stabiliser = Stabiliser::Inclination)
         },
     },
+    Entry { name: "policy", file: "policy.toml", make: |subject, file, text| subject.policy(file, text) },
 ];
 
 /// Names of the engines. `dynamic-open` is `dynamic` with its closed loop off, `…-tuned` an engine with the settings that
 /// `instep tune` found. `adaptive-once` plans the retraction once, `adaptive-sphere` takes the foot for a sphere,
-/// `adaptive-inclination` has the paper's stabiliser.
+/// `adaptive-inclination` has the paper's stabiliser. `policy` starts in a run-up.
 pub fn engines() -> impl Iterator<Item = &'static str> {
     ENTRIES.iter().map(|entry| entry.name)
 }
 
 /// The engines that are compared unless others are asked for: one of each kind, as it is meant to be used.
-pub const LEADING: [&str; 3] = ["dynamic", "adaptive", "preview-tuned"];
+pub const LEADING: [&str; 4] = ["dynamic", "adaptive", "preview-tuned", "policy"];
 
 /// A robot with what its trials share.
 #[derive(Debug, Clone)]
@@ -205,6 +207,12 @@ impl Subject {
     fn preview(&self, file: &str, text: &str) -> Made {
         let settings = PreviewSettings::parse(file, text)?;
         Ok(Box::new(PreviewKick::new(Arc::clone(&self.robot), self.ball, settings)?))
+    }
+
+    fn policy(&self, file: &str, text: &str) -> Made {
+        let settings = PolicySettings::parse(file, text)?;
+        let policy = settings.load_policy(&self.folder)?;
+        Ok(Box::new(LearnedKick::new(&self.robot, self.ball, &policy, settings)?))
     }
 
     fn adaptive(&self, file: &str, text: &str, change: fn(&mut AdaptiveSettings)) -> Made {

@@ -29,15 +29,20 @@ pub struct Bench {
 }
 
 impl Bench {
-    /// Every cell, in the table's order: each robot with those of the engines that know it.
+    /// Every cell, in the table's order: each robot with those of the engines that know it, in the scenarios that ask from
+    /// where the engine starts.
     ///
     /// # Errors
-    /// When an engine's settings cannot be read.
+    /// When an engine's settings cannot be read, or do not fit the robot.
     pub fn cells(&self) -> Result<Vec<CellKey>, BenchError> {
         let mut cells = Vec::new();
         for subject in &self.subjects {
+            let mut engines = Vec::new();
+            for engine in self.engines.iter().filter(|engine| subject.knows(engine)) {
+                engines.push((engine, subject.engine(engine)?.own_start().is_some()));
+            }
             for scenario in &self.scenarios {
-                for engine in self.engines.iter().filter(|engine| subject.knows(engine)) {
+                for &(engine, _) in engines.iter().filter(|(_, starts)| *starts == scenario.run_up.is_some()) {
                     for &seed in &self.seeds {
                         cells.push(CellKey {
                             engine: engine.clone(),

@@ -3,6 +3,9 @@
 //! Lengths that depend on the robot's size are shares of its leg length or of half the distance of its soles, so that
 //! one file serves all robots. Every pair of numbers is a range that is drawn from evenly. The draws come from one
 //! seeded generator, in a fixed order: same file, robot and seed, same cases.
+//!
+//! An engine that cannot start from the stand is asked for its own kick from its own start, with the ball a little off its
+//! place: by the scenarios with a `run_up`, and by these alone.
 
 use std::path::Path;
 
@@ -25,10 +28,15 @@ pub struct Scenario {
     pub name: String,
     /// One line for people.
     pub title: String,
-    /// Where the ball lies.
+    /// Where the ball lies, of a robot that stands.
+    #[serde(default)]
     pub ball: BallPlace,
-    /// Which kick is asked.
+    /// Which kick is asked of it.
+    #[serde(default)]
     pub kick: Kick,
+    /// In place of both: the kick of an engine that has its own start.
+    #[serde(default)]
+    pub run_up: Option<RunUp>,
     /// Noise and delay of sensors; the ball's noise is also in the request.
     #[serde(default)]
     pub sensors: SensorNoise,
@@ -44,7 +52,7 @@ pub struct Scenario {
 }
 
 /// Where the ball lies. Either side of the robot, with equal chance.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BallPlace {
     /// Gap between the toes' line and the ball's surface, share of the leg length.
@@ -55,7 +63,7 @@ pub struct BallPlace {
 }
 
 /// Which kick is asked.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Kick {
     /// Direction, degrees; positive is toward the middle line and beyond, as seen from the ball's side.
@@ -65,6 +73,14 @@ pub struct Kick {
     /// Directions are not drawn but taken in turn: this many, evenly from the least to the greatest.
     #[serde(default)]
     pub sweep: Option<usize>,
+}
+
+/// The kick of an engine that has its own start: its direction, its speed, nearly its ball.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RunUp {
+    /// How far the ball lies from the engine's own place, in any direction, share of the leg length.
+    pub shift: Range,
 }
 
 /// The ground; ranges of the fields of `instep_sim::settings::Pitch`.
@@ -206,7 +222,24 @@ impl Scenario {
             ("disturbance.ball_moved_before", d.ball_moved_before),
             ("disturbance.rolling", d.rolling),
             ("disturbance.rolling_from_deg", d.rolling_from_deg),
+            ("run_up.shift", self.run_up.map(|run_up| run_up.shift)),
         ];
+        let (ball, kick) = (self.ball != BallPlace::default(), self.kick != Kick::default());
+        let found = match (ball, kick, self.run_up.is_some()) {
+            (true, true, false) | (false, false, true) => None,
+            (true, _, true) => Some("[ball] beside [run_up]"),
+            (false, true, true) => Some("[kick] beside [run_up]"),
+            (false, _, false) => Some("no [ball]"),
+            (true, false, false) => Some("no [kick]"),
+        };
+        if let Some(found) = found {
+            return Err(BenchError::Field {
+                file: file.to_owned(),
+                field: "what is asked".into(),
+                found: found.into(),
+                expected: "[ball] and [kick] of a robot that stands, or [run_up] alone".into(),
+            });
+        }
         let whole = self.kick.sweep.is_none_or(|count| (2..=1000).contains(&count));
         let time = d.rolling_time.unwrap_or(ROLL_TIME);
         for (field, found, good, expected) in [
@@ -248,6 +281,27 @@ impl Scenario {
     pub fn cases(&self, size: &Size, seed: u64, count: usize) -> Vec<Case> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         (0..count).map(|i| self.case(size, i, &mut rng)).collect()
+    }
+
+    /// The same for an engine whose `own` kick is to be asked, nearly.
+    #[must_use]
+    pub fn cases_about(&self, own: &KickRequest, size: &Size, seed: u64, count: usize) -> Vec<Case> {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let [low, high] = self.run_up.map_or([0.0; 2], |run_up| run_up.shift);
+        (0..count)
+            .map(|i| {
+                let mut case = self.case(size, i, &mut rng);
+                let distance = (low + (high - low) * rng.random::<f64>()) * size.leg;
+                let angle = std::f64::consts::TAU * rng.random::<f64>();
+                // What noise does to the sight of the ball is in the request already.
+                let seen = [0, 1].map(|k| case.request.ball[k] - case.ball[k]);
+                case.ball = [own.ball[0] + distance * angle.cos(), own.ball[1] + distance * angle.sin()];
+                let ball = [0, 1].map(|k| case.ball[k] + seen[k]);
+                case.request = KickRequest { ball, ..*own };
+                (case.turn, case.side) = (0.0, 1.0);
+                case
+            })
+            .collect()
     }
 
     fn case(&self, size: &Size, index: usize, rng: &mut ChaCha8Rng) -> Case {

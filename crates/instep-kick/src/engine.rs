@@ -112,6 +112,20 @@ pub struct Progress {
     pub foot: Option<Side>,
 }
 
+/// Where the kicks of an engine start that cannot start from the stand.
+#[derive(Debug, Clone, PartialEq)]
+pub struct KickStart {
+    /// Position, 7 + n; world frame.
+    pub q: Vec<f64>,
+    /// Speed, 6 + n.
+    pub v: Vec<f64>,
+    /// The ground point midway between the soles, m, world frame: the origin of the frame of its requests, whose axes are
+    /// the world's (in a run-up the soles' headings change from step to step).
+    pub footprint: [f64; 2],
+    /// What it is to be asked for to do just what it can.
+    pub request: KickRequest,
+}
+
 /// A kick engine. As a [`Controller`] it is ticked once a control period and holds the stand when there is no kick.
 pub trait KickEngine: Controller {
     /// Short name for tables.
@@ -119,6 +133,11 @@ pub trait KickEngine: Controller {
 
     /// Period at which it wants to be ticked, s.
     fn control_period(&self) -> f64;
+
+    /// The state from which its kicks start, and the kick that it has from there; `None`: any kick, from the stand.
+    fn own_start(&self) -> Option<KickStart> {
+        None
+    }
 
     /// Plans `request` from the present `sensors`; the next tick starts the motion. May allocate.
     ///
@@ -130,7 +149,8 @@ pub trait KickEngine: Controller {
     fn release(&mut self);
 
     /// Gives the kick up at the next tick: the foot goes back and the robot stands on both feet again. Before the foot
-    /// has been lifted, at once; after contact it changes nothing but the status.
+    /// has been lifted, at once; after contact it changes nothing but the status. A run-up cannot be stopped: an engine with a
+    /// [`Self::own_start`] kicks all the same, and is cancelling until it stands.
     fn cancel(&mut self);
 
     /// How far it is.

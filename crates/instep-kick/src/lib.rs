@@ -33,8 +33,8 @@ pub mod tree;
 pub mod whole_body;
 
 pub use ball::BallModel;
-pub use engine::{BreakOff, Face, KickEngine, KickPlan, KickStatus, Phase, Progress};
+pub use engine::{BreakOff, Face, KickEngine, KickPlan, KickStart, KickStatus, Phase, Progress};
 pub use error::KickError;
 pub use playback::Playback;
-pub use request::{KickRequest, Place, Refusal, Strength};
+pub use request::{KickRequest, Learned, Place, Refusal, Strength};
 pub use settings::Settings;

@@ -253,6 +253,77 @@ pub enum Refusal {
         /// How far off, rad.
         off: f64,
     },
+    /// The robot is not in the pose from which the engine's kick starts.
+    #[error("the robot is not in the pose from which this kick starts: joint {joint} is {off:.2} rad off")]
+    NotAtStart {
+        /// Index of the joint.
+        joint: usize,
+        /// How far off, rad.
+        off: f64,
+    },
+    /// The engine has learned one kick, and another is asked.
+    #[error("{} is {}; only one kick was learned: ball at ({:.3}, {:.3}) m, {:.0} degrees, {:.1} m/s",
+        .what, off_text(.what, *.off, *.most), .ball[0], .ball[1], .direction.to_degrees(), .ball_speed)]
+    OtherKick {
+        /// What differs.
+        what: Learned,
+        /// By how much: m, m/s or rad.
+        off: f64,
+        /// By how much it may.
+        most: f64,
+        /// Where the ball of the learned kick lies, m.
+        ball: [f64; 2],
+        /// Where it goes, rad.
+        direction: f64,
+        /// How fast, m/s.
+        ball_speed: f64,
+    },
+    /// The engine kicks with one foot, and the other is asked.
+    #[error("the kick was learned with the {foot} foot only")]
+    OtherFoot {
+        /// The foot that it has.
+        foot: Side,
+    },
+    /// The engine cannot hold the foot back.
+    #[error("the foot of a kick out of a run-up cannot be held back; ask without `hold`")]
+    CannotHold,
+}
+
+/// A part of a learned kick that a request may ask otherwise.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Learned {
+    /// Where the ball lies.
+    Ball,
+    /// That it lies still.
+    Rest,
+    /// Where it is to go.
+    Direction,
+    /// How fast.
+    Speed,
+}
+
+impl std::fmt::Display for Learned {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Ball => "the ball",
+            Self::Rest => "the ball's motion",
+            Self::Direction => "the direction",
+            Self::Speed => "the ball's speed",
+        })
+    }
+}
+
+/// By how much a part of a kick is another, in its unit.
+fn off_text(what: &Learned, off: f64, most: f64) -> String {
+    match what {
+        Learned::Ball => format!("{off:.3} m off its place, at most {most:.3} m is possible"),
+        Learned::Direction => {
+            format!("{:.1} degrees off, at most {:.1} is possible", off.to_degrees(), most.to_degrees())
+        }
+        Learned::Rest => format!("{off:.2} m/s, at most {most:.2} m/s is possible"),
+        Learned::Speed => format!("{off:.2} m/s off, at most {most:.2} m/s is possible"),
+    }
 }
 
 impl Refusal {
@@ -270,6 +341,12 @@ impl Refusal {
             }
             Self::NotStanding { joint, off } => {
                 format!("the robot is not in its standing pose: {} is {off:.2} rad off", name(*joint))
+            }
+            Self::NotAtStart { joint, off } => {
+                format!(
+                    "the robot is not in the pose from which this kick starts: {} is {off:.2} rad off",
+                    name(*joint)
+                )
             }
             other => other.to_string(),
         }
@@ -296,6 +373,10 @@ impl Refusal {
             Self::OutsideGrid { .. } => "outside_grid",
             Self::Busy => "busy",
             Self::NotStanding { .. } => "not_standing",
+            Self::NotAtStart { .. } => "not_at_start",
+            Self::OtherKick { .. } => "other_kick",
+            Self::OtherFoot { .. } => "other_foot",
+            Self::CannotHold => "cannot_hold",
         }
     }
 }

@@ -574,13 +574,17 @@ fn is_reach(refusal: &Refusal) -> bool {
         | Refusal::TooHeavy { .. }
         | Refusal::HitsGround { .. }
         | Refusal::OutsideGrid { .. }
+        | Refusal::OtherKick { .. }
+        | Refusal::OtherFoot { .. }
         | Refusal::OffBalance { .. } => true,
         Refusal::NotFinite { .. }
         | Refusal::NoStrength { .. }
         | Refusal::TooLate { .. }
         | Refusal::TooImprecise { .. }
         | Refusal::Busy
-        | Refusal::NotStanding { .. } => false,
+        | Refusal::NotStanding { .. }
+        | Refusal::NotAtStart { .. }
+        | Refusal::CannotHold => false,
     }
 }
 

@@ -15,7 +15,7 @@ use crate::{files, places};
 /// The arguments of `instep bench`.
 #[derive(Debug, Args)]
 pub(crate) struct Bench {
-    /// Engines, separated by commas [default: dynamic,adaptive,preview-tuned, where a robot has settings for them]
+    /// Engines, separated by commas [default: dynamic,adaptive,preview-tuned,policy, where a robot has settings for them]
     #[arg(long, value_name = "ENGINE", value_delimiter = ',')]
     engine: Vec<String>,
     /// Robots, separated by commas
@@ -58,6 +58,12 @@ impl Bench {
     /// When a name is not known, a file cannot be used, or a simulation diverges.
     pub(crate) fn run(self, output: &Output) -> Result<ExitCode, Failure> {
         let bench = self.bench()?;
+        let cells = bench.cells()?;
+        if cells.is_empty() {
+            let message = "nothing to compare: engines that start in a run-up (policy) are asked by the scenarios run-up… \
+                           alone, the others by the other scenarios";
+            return Err(Failure::input(message));
+        }
         let names = ["bench.md", "bench.csv", "bench.json", "bench.html"].map(|name| self.out.join(name));
         for file in &names {
             files::check_file(file)?;
@@ -74,7 +80,7 @@ impl Bench {
         if self.resume.is_none() {
             std::fs::write(&kept, "").map_err(unusable)?;
         }
-        let bar = output::bar(bench.cells()?.len() as u64, "{wide_bar} {pos}/{len} {msg} {eta}");
+        let bar = output::bar(cells.len() as u64, "{wide_bar} {pos}/{len} {msg} {eta}");
         let cells = bench.run(Some(&kept), &|done, _, key| {
             bar.set_position(done as u64);
             bar.set_message(format!("{} {} {}", key.engine, key.robot, key.scenario));

@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 use clap::Args;
 use instep_kick::policy::PolicyKick;
-use instep_kick::{KickPlan, KickRequest, Playback};
+use instep_kick::{KickPlan, KickRequest, Playback, Strength};
 use instep_motion::phase::Side;
 use instep_motion::reference::{Reference, ReferenceKind};
 use instep_robot::Robot;
@@ -29,6 +29,8 @@ use crate::{files, places};
 const AFTERMATH: f64 = 1.2;
 /// The longest trial, s.
 const LONGEST: f64 = 120.0;
+/// The robot that kicks when nothing says which.
+const ROBOT: &str = "prestoe";
 
 /// The arguments of `instep kick`.
 #[derive(Debug, Args)]
@@ -36,10 +38,10 @@ pub(crate) struct Kick {
     /// The motion to play open loop, in place of running a policy: a file that `instep retarget` wrote
     #[arg(long, value_name = "FILE")]
     reference: Option<PathBuf>,
-    /// The policy to run: a file that `instep train` wrote
-    #[arg(long, value_name = "FILE", default_value = "policies/prestoe/10_03.safetensors", conflicts_with_all = ["reference", "engine"])]
-    policy: PathBuf,
-    /// The robot: a name, or the path of its folder or robot.toml [default: the reference's]
+    /// The policy to run: a file that `instep train` wrote [default: that of the robot's policy.toml]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["reference", "engine"])]
+    policy: Option<PathBuf>,
+    /// The robot: a name, or the path of its folder or robot.toml [default: the reference's or policy's, else prestoe]
     #[arg(long, value_name = "ROBOT")]
     robot: Option<String>,
     /// Where the ball lies, in metres: x along the kick, y to its left [default: the reference's ball]
@@ -60,12 +62,12 @@ pub(crate) struct Kick {
     /// Kick on request with this engine, as `instep bench` names them, in place of playing a reference
     #[arg(long, value_name = "ENGINE", conflicts_with_all = ["reference", "start", "duration"])]
     engine: Option<String>,
-    /// With --engine: direction of the ball, in degrees from straight ahead to the left
-    #[arg(long, value_name = "ANGLE", allow_hyphen_values = true, value_parser = degrees, requires = "engine", default_value = "0deg")]
-    direction: f64,
-    /// With --engine: speed of the ball, in m/s
-    #[arg(long, value_name = "SPEED", allow_negative_numbers = true, requires = "engine", default_value_t = 1.0)]
-    speed: f64,
+    /// With --engine: direction of the ball, in degrees from straight ahead to the left [default: 0, or the engine's only one]
+    #[arg(long, value_name = "ANGLE", allow_hyphen_values = true, value_parser = degrees, requires = "engine")]
+    direction: Option<f64>,
+    /// With --engine: speed of the ball, in m/s [default: 1, or the engine's only one]
+    #[arg(long, value_name = "SPEED", allow_negative_numbers = true, requires = "engine")]
+    speed: Option<f64>,
     /// With --engine: a file of requests (a JSON array, or one JSON object a line) in place of --ball; writes no report
     #[arg(long, value_name = "FILE", requires = "engine", conflicts_with_all = ["ball", "direction", "speed"])]
     requests: Option<PathBuf>,
@@ -132,10 +134,15 @@ impl Kick {
         if let Some(name) = &self.engine {
             return self.on_request(name, output);
         }
-        let Ready { robot, reference, reference_file, start, mut controller, q, v } = match &self.reference {
-            Some(file) => self.with_playback(file)?,
-            None => self.with_policy(&self.policy)?,
+        let (ready, policy) = match &self.reference {
+            Some(file) => (self.with_playback(file)?, None),
+            None => {
+                let shipped = || places::shipped_policy(self.robot.as_deref().unwrap_or(ROBOT));
+                let file = self.policy.clone().map_or_else(shipped, Ok)?;
+                (self.with_policy(&file)?, Some(file))
+            }
         };
+        let Ready { robot, reference, reference_file, start, mut controller, q, v } = ready;
         let phases = &reference.phases;
         let until = reference.duration().max(phases.t_impact + AFTERMATH);
         let duration = self.duration.unwrap_or(until - start);
@@ -160,7 +167,6 @@ impl Kick {
             direction: 0.0,
         };
         let trial = trial::run(&robot, &settings, controller.as_mut())?;
-        let policy = self.reference.is_none().then_some(self.policy);
         let followed = Arc::new(Followed { reference, file: reference_file, policy, start });
         let source = Source::Followed(Arc::clone(&followed));
         let tried = Tried { robot, source, settings, trial, report, recording };
@@ -217,13 +223,25 @@ impl Kick {
         let subject = instep_bench::Subject::of(places::robot(robot)?)?;
         let requests = match (&self.requests, self.ball) {
             (Some(file), _) => engine::load(file)?,
-            (None, Some(ball)) => {
-                vec![engine::Wanted { ball, direction: self.direction, speed: self.speed }.request()]
-            }
-            (None, None) => return Err(Failure::input("--ball: where is the ball? such as --ball 0.2,-0.05")),
+            (None, ball) => vec![self.request(ball, subject.engine(engine)?.own_start().map(|start| start.request))?],
         };
         let world = self.world.as_deref().map(world_settings).transpose()?;
         engine::run(&subject, engine, &requests, world, self.seed, &self.out, output)
+    }
+}
+
+impl Kick {
+    /// The request of the command line; what it does not say is the engine's `own`, where that has only one.
+    fn request(&self, ball: Option<[f64; 2]>, own: Option<KickRequest>) -> Result<KickRequest, Failure> {
+        let mut request = match (own, ball) {
+            (Some(own), _) => own,
+            (None, Some(ball)) => KickRequest::new(ball, 0.0, 1.0),
+            (None, None) => return Err(Failure::input("--ball: where is the ball? such as --ball 0.2,-0.05")),
+        };
+        request.ball = ball.unwrap_or(request.ball);
+        request.direction = self.direction.unwrap_or(request.direction);
+        request.strength = self.speed.map_or(request.strength, Strength::BallSpeed);
+        Ok(request)
     }
 }
 

@@ -3,6 +3,8 @@
 
 use std::path::{Path, PathBuf};
 
+use instep_kick::Settings;
+use instep_kick::policy::PolicySettings;
 use instep_robot::Robot;
 use serde::de::DeserializeOwned;
 
@@ -64,6 +66,15 @@ pub(crate) fn reference(path: &Path) -> Result<PathBuf, Failure> {
 pub(crate) fn policy(path: &Path) -> Result<PathBuf, Failure> {
     let found = if path.is_relative() { find(path) } else { None };
     existing_file("--policy", found.as_deref().unwrap_or(path), "a policy (safetensors), as `instep train` writes it")
+}
+
+/// The policy that the engine `policy` runs on the robot that the user means.
+///
+/// # Errors
+/// When there is no such robot, or it has no policy.
+pub(crate) fn shipped_policy(name_or_path: &str) -> Result<PathBuf, Failure> {
+    let robot = robot(name_or_path)?;
+    Ok(PolicySettings::load(robot.folder())?.path(robot.folder()))
 }
 
 /// The tuning file that the user means: a path, or one of the shipped ones as `tuning/<name>.toml`.

@@ -47,6 +47,8 @@ fn a_wrong_scenario_is_refused_with_its_place() {
     let file = folder.path().join("bad.toml");
     std::fs::write(&file, text.replace("gap = [0.05, 0.15]", "gap = [0.15, 0.05]")).unwrap();
     assert!(matches!(Scenario::load(&file), Err(BenchError::Field { field, .. }) if field == "ball.gap"));
+    std::fs::write(&file, text.clone() + "\n[run_up]\nshift = [0.0, 0.1]\n").unwrap();
+    assert!(matches!(Scenario::load(&file), Err(BenchError::Field { found, .. }) if found.contains("run_up")));
     std::fs::write(&file, text.replace("[kick]", "[kicc]")).unwrap();
     assert!(matches!(Scenario::load(&file), Err(BenchError::File { .. })));
 }
@@ -95,6 +97,31 @@ fn cells_are_the_same_on_one_thread_and_on_two_and_after_a_stop() {
     assert_eq!(markdown(&each).lines().count(), 6);
     assert_eq!(csv(&each).lines().count(), 5);
     instep_bench::page::page(&each, &[], vec![]).check().unwrap();
+}
+
+#[test]
+fn an_engine_with_its_own_start_is_asked_by_the_run_ups_alone() {
+    let mut bench = bench(&["run-up", "run-up-push", "straight"], 2);
+    bench.engines = vec!["policy".into(), "dynamic".into()];
+    bench.subjects.push(Subject::load(&root("robots"), "prestoe").unwrap());
+    bench.seeds.truncate(1);
+    let cells = bench.cells().unwrap();
+    let asked: Vec<_> =
+        cells.iter().map(|key| (key.robot.as_str(), key.engine.as_str(), key.scenario.as_str())).collect();
+    let expected = [
+        ("wolfgang", "dynamic", "straight"),
+        ("prestoe", "policy", "run-up"),
+        ("prestoe", "policy", "run-up-push"),
+        ("prestoe", "dynamic", "straight"),
+    ];
+    assert_eq!(asked, expected);
+
+    bench.engines.truncate(1);
+    bench.scenarios.truncate(1);
+    let row = rows(&bench.run(None, &|_, _, _| {}).unwrap()).remove(0);
+    assert_eq!((row.requests, row.refused), (2, 0));
+    assert_eq!(row.hit_rate, Some(1.0), "{row:?}");
+    assert!(row.ball_speed_median.unwrap() > 10.0, "{row:?}");
 }
 
 #[test]

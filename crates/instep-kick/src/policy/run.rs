@@ -32,15 +32,22 @@ impl PolicyKick {
     /// # Errors
     /// When policy and robot do not fit, or the track does not hold `start`.
     pub fn new(robot: &Arc<Robot>, policy: &Policy, start: f64) -> Result<Self, KickError> {
-        let mut follower = policy.follower(robot)?;
+        let follower = policy.follower(robot)?;
         let duration = follower.track().duration();
         if !(0.0..duration).contains(&start) {
             return Err(KickError::Start { start, duration });
         }
-        let (q, v) = follower.track().initial_state(start);
-        follower.start(0.0, start, Vector3::new(q[0], q[1], q[2]), Vector3::new(v[0], v[1], v[2]));
         let observation = vec![0.0; follower.observation_len()];
-        Ok(Self { follower, network: policy.network.clone(), observation, next: 0.0, start })
+        let mut kick = Self { follower, network: policy.network.clone(), observation, next: 0.0, start };
+        kick.begin(0.0);
+        Ok(kick)
+    }
+
+    /// Begins anew at the sensors' `time` (s), with the robot in [`Self::initial_state`].
+    pub fn begin(&mut self, time: f64) {
+        let (q, v) = self.initial_state();
+        self.follower.start(time, self.start, Vector3::new(q[0], q[1], q[2]), Vector3::new(v[0], v[1], v[2]));
+        self.next = time;
     }
 
     /// The state from which it starts: q (7 + n) and v (6 + n), in the reference's world.

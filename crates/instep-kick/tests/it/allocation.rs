@@ -9,10 +9,11 @@ use instep_kick::adaptive::AdaptiveKick;
 use instep_kick::dynamic::DynamicKick;
 use instep_kick::policy::PolicyKick;
 use instep_kick::preview::{Com, PreviewKick, PreviewSettings, Stabiliser};
-use instep_kick::{BallModel, BreakOff, KickEngine, KickRequest, Playback};
+use instep_kick::{BallModel, BreakOff, KickEngine, KickRequest, KickStatus, Playback};
 use instep_robot::Robot;
 use instep_robot::control::{BallObservation, Controller, JointCommand};
 
+use crate::learned::learned;
 use crate::policy::{policy, prestoe};
 use crate::rig::{engine, request, robot, standing};
 
@@ -109,6 +110,30 @@ fn the_adaptive_kick_allocates_nothing_while_it_follows_the_ball() {
         }
         assert_eq!(COUNT.get(), before, "{name} allocated in a tick");
         assert_eq!(broke, Some(BreakOff::BallGone), "{name}");
+    }
+}
+
+#[test]
+fn a_tick_of_the_policys_engine_allocates_nothing() {
+    for cancel in [false, true] {
+        let mut engine = learned();
+        let robot = robot("prestoe");
+        let start = engine.own_start().unwrap();
+        let mut sensors = standing(&robot);
+        sensors.joint_positions.copy_from_slice(&start.q[7..]);
+        let mut command = JointCommand::zeros(robot.joints.len());
+        let plan = engine.plan(&start.request, &sensors).unwrap();
+        let before = COUNT.get();
+        while sensors.time < plan.duration + 0.5 {
+            if cancel && sensors.time > 0.9 * plan.contact {
+                engine.cancel();
+            }
+            engine.tick(&sensors, &mut command);
+            sensors.time += engine.control_period();
+        }
+        assert_eq!(COUNT.get(), before, "allocated in a tick");
+        let status = if cancel { KickStatus::Cancelled } else { KickStatus::Finished };
+        assert_eq!(engine.progress().status, status);
     }
 }
 

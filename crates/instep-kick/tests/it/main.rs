@@ -5,6 +5,7 @@ mod allocation;
 mod cancel;
 mod issue_304;
 mod kinematics;
+mod learned;
 mod policy;
 mod preview;
 mod refusals;

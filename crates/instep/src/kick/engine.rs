@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use instep_bench::Subject;
 use instep_bench::cell::{Kicked, Ran, run_case};
 use instep_bench::scenario::Case;
-use instep_kick::{KickRequest, Strength};
+use instep_kick::KickRequest;
 use instep_sim::World;
 use instep_sim::settings::{ModelError, WorldSettings};
 use serde::Serialize;
@@ -37,17 +37,7 @@ struct Refused {
     message: String,
 }
 
-/// One request of the command line.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Wanted {
-    pub(super) ball: [f64; 2],
-    /// rad
-    pub(super) direction: f64,
-    /// Ball speed, m/s.
-    pub(super) speed: f64,
-}
-
-/// Runs `requests` one after the other, each from the stand; a single one is shown in a report under `out`.
+/// Runs `requests` one after the other, each from where the engine starts; a single one is shown in a report under `out`.
 ///
 /// # Errors
 /// When engine or world cannot be made, or a simulation diverges. A refusal is an answer.
@@ -140,10 +130,4 @@ pub(super) fn load(path: &Path) -> Result<Vec<KickRequest>, Failure> {
     lines
         .map(|(i, line)| serde_json::from_str(line).map_err(|e| wrong(format!("line {}: {e}; {expected}", i + 1))))
         .collect()
-}
-
-impl Wanted {
-    pub(super) fn request(self) -> KickRequest {
-        KickRequest { strength: Strength::BallSpeed(self.speed), ..KickRequest::new(self.ball, self.direction, 1.0) }
-    }
 }

@@ -19,16 +19,18 @@ pub(super) fn events(trial: &Trial) -> Vec<(f64, &'static str)> {
 
 /// Where the kick started, and what was therefore not tried.
 pub(super) fn start(tried: &Tried) -> String {
+    let q_speed = Vector3::new(tried.settings.v[0], tried.settings.v[1], tried.settings.v[2]).norm();
     let followed = match &tried.source {
         Source::Followed(followed) => followed,
         Source::Asked { plan, .. } => {
-            return format!(
-                "from the stand, contact forecast at {:.2} s with {:.2} m/s",
-                plan.contact, plan.ball_speed
-            );
+            let from = if q_speed > 0.0 {
+                format!("from a run-up at {q_speed:.2} m/s, whose beginning was not simulated")
+            } else {
+                "from the stand".into()
+            };
+            return format!("{from}, contact forecast at {:.2} s with {:.2} m/s", plan.contact, plan.ball_speed);
         }
     };
-    let q_speed = Vector3::new(tried.settings.v[0], tried.settings.v[1], tried.settings.v[2]).norm();
     let (start, end) = (followed.start, followed.reference.duration());
     if start == 0.0 {
         format!("played from its beginning, with the base already moving at {q_speed:.2} m/s")

@@ -30,6 +30,23 @@ fn a_refused_request_is_an_answer_and_writes_nothing() {
 }
 
 #[test]
+fn the_policy_on_request_kicks_as_the_policy_that_is_played() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("world.toml"), "").unwrap();
+    let world = ["--world", "world.toml", "--json"];
+    let played = object(&instep(folder.path(), &[&["kick"], &world[..]].concat()));
+    let ask = ["kick", "--engine", "policy", "--robot", "prestoe"];
+    let asked = object(&instep(folder.path(), &[&ask[..], &world].concat()));
+    let answer = &asked["requests"][0];
+    assert!(answer["refused"].is_null(), "{answer}");
+    assert_eq!(answer["kicked"]["ball_speed"], played["ball_speed"]);
+    assert_eq!(answer["direction_error_deg"], played["direction_error_deg"]);
+    assert!(played["ball_speed"].as_f64().unwrap() > 10.0);
+    let refused = object(&instep(folder.path(), &[&ask[..], &["--speed", "3", "--json"]].concat()));
+    assert_eq!(refused["requests"][0]["refused"]["cause"], "other_kick");
+}
+
+#[test]
 fn many_requests_come_from_a_file_each_with_its_answer() {
     let folder = tempfile::tempdir().unwrap();
     let lines = "{\"ball\": [0.2, -0.05], \"direction\": 0.1, \"strength\": {\"ball_speed\": 1.0}}\n\
@@ -86,6 +103,9 @@ fn what_no_engine_robot_or_scenario_has_is_refused() {
     wrong(&["engine", "dynamc", "dynamic"], &["bench", "--engine", "dynamc"]);
     wrong(&["scenario", "strait", "straight"], &["bench", "--scenario", "strait"]);
     wrong(&["--requests", "0"], &["bench", "--requests", "0"]);
+    wrong(&["run-up"], &["bench", "--engine", "policy", "--robot", "prestoe", "--scenario", "straight"]);
+    wrong(&["policy", "nao", "policy.toml"], &["bench", "--engine", "policy", "--robot", "nao"]);
+    wrong(&["policy.toml", "nao"], &["kick", "--robot", "nao"]);
     wrong(&["--ball"], &["kick", "--engine", "dynamic", "--robot", "nao"]);
     wrong(&["--robot"], &["kick", "--engine", "dynamic", "--ball", "0.2,0"]);
     std::fs::write(folder.path().join("bad.jsonl"), "{\"ball\": 3}").unwrap();
