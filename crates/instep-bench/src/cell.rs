@@ -38,7 +38,7 @@ pub struct CellKey {
     /// Number of requests.
     pub requests: usize,
     /// Of the robot, its settings and the scenario: a kept cell counts only while these are the same. It does not see
-    /// a change of the program.
+    /// a change of the program, of a policy or of a reachability grid.
     #[serde(default)]
     pub fingerprint: u64,
 }

@@ -91,7 +91,8 @@ impl Bench {
         let text = markdown(&all);
         let note = format!(
             "{} requests and {} seeds a scenario. A ball speed counts only where its impact passed the audit; a hit is a \
-             ball that leaves at 0.3 of the asked speed or more. Times are those of one thread on its core.",
+             ball that leaves at 0.3 of the asked speed or more. Times are those of one thread on its core. Trials of the \
+             scenarios run-up… start in the engine's own run-up, all others from the stand.",
             bench.requests,
             bench.seeds.len()
         );
