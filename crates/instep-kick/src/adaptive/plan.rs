@@ -58,6 +58,26 @@ pub(crate) struct Planned {
     pub(crate) plan: KickPlan,
 }
 
+/// Where a ball is met, and how hard a stroke for it is looked for.
+#[derive(Debug, Clone, Copy)]
+struct Meeting {
+    /// The ball at the contact, footprint frame, m.
+    ball: [f64; 2],
+    /// Its velocity there, m/s.
+    velocity: [f64; 2],
+    /// When the contact is to be, s; 0: as soon as can be.
+    at: f64,
+    /// Strokes whose whole way may be forecast.
+    forecasts: usize,
+}
+
+impl Meeting {
+    /// A ball at rest at `ball` (m), as soon as can be.
+    fn at_rest(ball: [f64; 2], forecasts: usize) -> Self {
+        Self { ball, velocity: [0.0; 2], at: 0.0, forecasts }
+    }
+}
+
 /// The planner of one robot.
 #[derive(Debug)]
 pub(crate) struct Planner {
@@ -113,8 +133,8 @@ impl Planner {
         request: &KickRequest,
     ) -> Result<Planned, Refusal> {
         if Vector2::from(request.ball_velocity).norm() < 0.02 {
-            let ball = (request.ball, [0.0; 2]);
-            return Ok(self.plan_at(body, settings, grid, request, ball, 0.0, FORECASTS)?.0);
+            let meeting = Meeting::at_rest(request.ball, FORECASTS);
+            return Ok(self.plan_at(body, settings, grid, request, &meeting)?.0);
         }
         let t = &settings.times;
         let soonest = t.shift + t.settle + 2.0 * t.foot_least + t.aim + 0.3;
@@ -123,8 +143,9 @@ impl Planner {
         let mut good = 0;
         for i in 0..=(settings.kick.wait / WAIT_STEP) as usize {
             let at = soonest + i as f64 * WAIT_STEP;
-            let ball = body.ball.roll(request.ball, request.ball_velocity, at);
-            match self.plan_at(body, settings, grid, request, ball, at, FEW_FORECASTS) {
+            let (ball, velocity) = body.ball.roll(request.ball, request.ball_velocity, at);
+            let meeting = Meeting { ball, velocity, at, forecasts: FEW_FORECASTS };
+            match self.plan_at(body, settings, grid, request, &meeting) {
                 // A foot that comes later than the ball misses it.
                 Ok((planned, _)) if planned.plan.contact > at + ON_TIME => {}
                 Ok((planned, cost)) => {
@@ -173,18 +194,16 @@ impl Planner {
         &self.found
     }
 
-    /// Plans for a ball that is at a place (m) with a velocity (m/s) at the contact, which is to be at `at` (s; 0: as
-    /// soon as can be), by the best of at most `most` strokes.
+    /// Plans for a meeting with the ball; gives the plan and its cost.
     fn plan_at(
         &mut self,
         body: &Body,
         settings: &AdaptiveSettings,
         grid: &Grid,
         request: &KickRequest,
-        (ball, velocity): ([f64; 2], [f64; 2]),
-        at: f64,
-        most: usize,
+        meeting: &Meeting,
     ) -> Result<(Planned, f64), Refusal> {
+        let &Meeting { ball, velocity, at, forecasts: most } = meeting;
         self.look_up(body, settings, grid, request, (ball, velocity));
         let found = std::mem::take(&mut self.found);
         let mut refusal = None;
@@ -356,7 +375,8 @@ impl Planner {
         steps.sort_by_key(|[x, y, turn]| (x * x + y * y + turn * turn, turn.abs(), x.abs(), *x, *y, *turn));
         let mut tries = |ball: [f64; 2], direction: f64| {
             let asked = KickRequest { ball, direction, ball_velocity: [0.0; 2], hold: false, ..*request };
-            self.plan_at(body, settings, grid, &asked, (ball, [0.0; 2]), 0.0, FEW_FORECASTS).map(|_| (ball, direction))
+            let meeting = Meeting::at_rest(ball, FEW_FORECASTS);
+            self.plan_at(body, settings, grid, &asked, &meeting).map(|_| (ball, direction))
         };
         let mut plans = 0;
         for [x, y, turn] in steps {
