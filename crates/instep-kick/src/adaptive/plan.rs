@@ -48,7 +48,7 @@ const NEAREST_BALL: f64 = 0.02;
 const NEAREST_DIRECTION: f64 = 0.175;
 /// Whole plans that such a search may take, and after them those along the way to an easy request.
 const NEAREST_PLANS: usize = 16;
-const EASIER: u32 = 10;
+const EASIER: u32 = 24;
 
 /// A motion that was forecast to be possible.
 #[derive(Debug, Clone, Copy)]
