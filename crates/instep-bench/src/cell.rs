@@ -180,7 +180,8 @@ pub struct Ran {
 /// The outcome of a case, the time of its plan (s), and what an accepted request led to.
 pub type Tried = (Result<Kicked, Refusal>, f64, Option<Ran>);
 
-/// Plans and tries one case, from the stand or from where the engine says that its kicks start. Gives the outcome, the time of the plan (s) and what an accepted request led to.
+/// Plans and tries one case, from the stand or from where the engine says that its kicks start. Gives the outcome, the
+/// time of the plan (s) and what an accepted request led to.
 ///
 /// # Errors
 /// When the simulation diverges.

@@ -15,6 +15,7 @@ pub mod audit;
 pub mod contact_law;
 mod error;
 pub mod impact;
+mod model;
 pub mod sensors;
 pub mod settings;
 pub mod trial;

@@ -18,6 +18,7 @@ use crate::KickError;
 use crate::ball::BallModel;
 use crate::engine::{Face, KickEngine, KickPlan, KickStart, KickStatus, Phase, Progress};
 use crate::request::{KickRequest, Learned, Refusal, Strength};
+use crate::whole_body::foot::wrap;
 
 /// Period at which the commands are renewed, s; the policy itself is asked at its own, longer one.
 const PERIOD: f64 = 0.002;
@@ -121,7 +122,7 @@ impl LearnedKick {
         for (what, off, most) in [
             (Learned::Rest, norm(request.ball_velocity), STILL),
             (Learned::Ball, norm([0, 1].map(|k| request.ball[k] - own.ball[k])), self.settings.reach),
-            (Learned::Direction, turn.sin().atan2(turn.cos()).abs(), plan.precision),
+            (Learned::Direction, wrap(turn).abs(), plan.precision),
             (Learned::Speed, (asked - plan.ball_speed).abs(), SPEED_SHARE * plan.ball_speed),
         ] {
             if off > most {
