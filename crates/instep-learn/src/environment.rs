@@ -26,11 +26,17 @@ use crate::termination::{End, part};
 
 /// Where the ball is while there is none, m: so high that an episode is over before it lands, and no step has to solve its
 /// contact with the ground.
-const NO_BALL: [f64; 3] = [60.0, 0.0, 1000.0];
+pub(crate) const NO_BALL: [f64; 3] = [60.0, 0.0, 1000.0];
 /// How long before the contact an episode must start for the ball to be there, s.
 const BALL_LEAD: f64 = 0.1;
 /// Least speed of a ball that has been kicked, m/s.
 const KICKED: f64 = 0.5;
+
+/// Whether an episode that starts at `at` (s) of `track` comes early enough for the ball: later the foot may already be where
+/// it lies.
+pub(crate) fn before_ball(track: &Track, at: f64) -> bool {
+    at + BALL_LEAD < track.contact_time()
+}
 
 /// What all environments share.
 #[derive(Debug)]
@@ -253,16 +259,17 @@ impl Environment {
         scene.settings.start.disturb(&scene.robot, &mut q, &mut v, &mut self.rng);
         let at = tick as f64 * scene.settings.follower.period;
         let track = self.follower.track();
-        self.with_ball = scene.settings.world.ball && at + BALL_LEAD < track.contact_time();
-        let ball = BallState::at_rest(if self.with_ball { track.reference().ball } else { NO_BALL });
-        self.world.reset(&q, &v, &ball)?;
+        self.with_ball = scene.settings.world.ball && before_ball(track, at);
+        let ball = if self.with_ball { track.reference().ball } else { NO_BALL };
+        self.world.reset(&q, &v, &BallState::at_rest(ball))?;
         let seed = self.rng.random();
         self.suite = SensorSuite::new(&self.world, seed);
         self.suite.sense(&self.world);
         (self.tick, self.started, self.moving) = (tick, tick, None);
         self.last_action.fill(0.0);
-        let (position, velocity) = (Vector3::new(q[0], q[1], q[2]), Vector3::new(v[0], v[1], v[2]));
-        self.follower.start(0.0, at, position, velocity);
+        // As on a robot: what is known at the start is the reference's state, not the error that was added to it.
+        let (q, v) = (&state.q, &state.v);
+        self.follower.start(0.0, at, Vector3::new(q[0], q[1], q[2]), Vector3::new(v[0], v[1], v[2]));
         self.look();
         Ok(())
     }
@@ -318,7 +325,7 @@ impl Environment {
         let ret = settings.termination.ret;
         let end = if ret && deviation.farthest.0 > threshold {
             Some(End::Link(deviation.farthest.1))
-        } else if has_fallen(&self.world) {
+        } else if ret && has_fallen(&self.world) {
             Some(End::Fell)
         } else {
             (self.tick + 1 >= scene.ticks.len()).then_some(End::Completed)

@@ -1,7 +1,8 @@
-//! What a policy is worth: seeded trials in the world in which every kick is measured, with the ball at its place.
+//! What a policy is worth: seeded trials in the world in which every kick is measured, with the ball at its place (unless they
+//! start too late for it).
 //!
-//! A trial starts in the track's first state (or a later one) with the small errors of [`StartSettings`], and goes on until two
-//! seconds after the contact, or the end of the stand if that is later.
+//! A trial starts in the track's first state (or a later one, or the trials' starts are spread over the clip) with the small
+//! errors of [`StartSettings`], and goes on until two seconds after the contact, or the end of the stand if that is later.
 
 use std::sync::Arc;
 
@@ -16,7 +17,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::LearnError;
-use crate::environment::Scene;
+use crate::environment::{NO_BALL, Scene, before_ball};
 use crate::settings::{ClipSettings, LearnSettings, StartSettings};
 
 /// A trial counts as completed while no link is farther from the reference than this, m: paper 1's fixed threshold.
@@ -33,6 +34,8 @@ pub struct Evaluation {
     pub seed: u64,
     /// Where in the track they start, s.
     pub start: f64,
+    /// Whether only the first starts there, and the others are spread evenly from there to the clip's end.
+    pub spread: bool,
     /// Errors of the start, and the stand that is part of the trial.
     pub errors: StartSettings,
     /// The world.
@@ -41,7 +44,23 @@ pub struct Evaluation {
 
 impl Default for Evaluation {
     fn default() -> Self {
-        Self { trials: 100, seed: 1, start: 0.0, errors: StartSettings::default(), world: WorldSettings::default() }
+        Self {
+            trials: 100,
+            seed: 1,
+            start: 0.0,
+            spread: false,
+            errors: StartSettings::default(),
+            world: WorldSettings::default(),
+        }
+    }
+}
+
+impl Evaluation {
+    /// Trial number `index` alone, of a clip of `duration` (s); it starts at a multiple of the policy's `period` (s).
+    fn single(&self, index: u64, duration: f64, period: f64) -> Self {
+        let share = if self.spread { index as f64 / self.trials as f64 } else { 0.0 };
+        let later = (share * (duration - self.start) / period).floor() * period;
+        Self { trials: 1, seed: self.seed + index, start: self.start + later, spread: false, ..self.clone() }
     }
 }
 
@@ -115,6 +134,7 @@ pub fn evaluate(
         ..LearnSettings::default()
     };
     let scene = Scene::new(Arc::clone(robot), Arc::clone(&policy.reference), settings)?;
+    let (duration, period) = (scene.follower().track().duration(), policy.header.follower.period);
     let each = (0..evaluation.trials as u64)
         .into_par_iter()
         .map_init(
@@ -124,7 +144,8 @@ pub fn evaluate(
                     Some(world) => world,
                     None => world.insert(World::new(Arc::clone(robot), &evaluation.world)?),
                 };
-                let tried = attempt(robot, policy, evaluation, &scene, world, evaluation.seed + index);
+                let single = evaluation.single(index, duration, period);
+                let tried = attempt(robot, policy, &single, &scene, world);
                 told();
                 tried
             },
@@ -133,36 +154,27 @@ pub fn evaluate(
     Ok(summary(each))
 }
 
-/// One trial of a policy with the small start errors of its seed, and the settings that it was run with.
-///
-/// # Errors
-/// As [`evaluate`].
-pub fn kick(
-    robot: &Arc<Robot>,
-    policy: &Policy,
-    evaluation: &Evaluation,
-    world: &mut World,
-    seed: u64,
-) -> Result<(TrialSettings, Trial), LearnError> {
+/// One trial of a policy at the evaluation's start, with the small start errors of its seed.
+fn kick(robot: &Arc<Robot>, policy: &Policy, evaluation: &Evaluation, world: &mut World) -> Result<Trial, LearnError> {
     let mut engine = PolicyKick::new(robot, policy, evaluation.start)?;
     let (mut q, mut v) = engine.initial_state();
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut rng = ChaCha8Rng::seed_from_u64(evaluation.seed);
     let errors = &evaluation.errors;
     errors.disturb(robot, &mut q, &mut v, &mut rng);
     let track = engine.follower().track();
     let (contact, end) = (track.contact_time(), track.duration() + errors.stand);
+    let ball = if before_ball(track, evaluation.start) { policy.reference.ball } else { NO_BALL };
     let settings = TrialSettings {
         world: evaluation.world,
-        seed,
+        seed: evaluation.seed,
         duration: end.max(contact + UPRIGHT) - evaluation.start,
         control_period: evaluation.world.step.far,
         q,
         v,
-        ball: BallState::at_rest(policy.reference.ball),
+        ball: BallState::at_rest(ball),
         direction: 0.0,
     };
-    let trial = trial::run_in(world, &settings, &mut engine)?;
-    Ok((settings, trial))
+    Ok(trial::run_in(world, &settings, &mut engine)?)
 }
 
 fn attempt(
@@ -171,9 +183,8 @@ fn attempt(
     evaluation: &Evaluation,
     scene: &Scene,
     world: &mut World,
-    seed: u64,
 ) -> Result<Tried, LearnError> {
-    let (_, trial) = kick(robot, policy, evaluation, world, seed)?;
+    let trial = kick(robot, policy, evaluation, world)?;
     let period = policy.header.follower.period;
     let track = scene.follower().track();
     let mut data = robot.data();
@@ -199,7 +210,7 @@ fn attempt(
     let hit = trial.impact.is_some();
     let clip_end = track.duration() - evaluation.start;
     Ok(Tried {
-        seed,
+        seed: evaluation.seed,
         completed: farthest <= COMPLETED && trial.fell_at.is_none_or(|time| time > clip_end),
         link_error: sum / f64::from(count.max(1)),
         ball_speed: trial.impact.as_ref().filter(|_| valid).map(instep_sim::impact::Impact::ball_speed),

@@ -107,7 +107,8 @@ impl Default for RewardSettings {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct TerminationSettings {
-    /// Whether (39) ends episodes. A fall always does.
+    /// Whether an episode ends early, by (39) or a fall. Without, it goes on to the clip's end whatever happens, and the
+    /// reward alone must tell: what the paper compares with.
     pub ret: bool,
     /// d_max of (40), m.
     pub d_max: f64,

@@ -122,20 +122,38 @@ fn every_episode_ends_for_a_reason_and_starts_where_it_is_told() {
 }
 
 #[test]
-fn without_early_termination_only_a_fall_ends_an_episode() {
+fn the_error_of_a_start_is_not_told_to_the_odometry() {
     let (robot, reference) = prestoe();
     let mut settings = small();
-    settings.termination.ret = false;
+    (settings.start.base_speed, settings.start.joint_speed) = (0.5, 0.5);
     let scene = Arc::new(Scene::new(Arc::clone(&robot), reference, settings).unwrap());
     let mut environment = Environment::new(scene, 1, 0).unwrap();
     environment.start(0).unwrap();
-    let action = vec![5.0; robot.joints.len()];
-    let end = loop {
-        if let Some(end) = environment.step(&action, 0.3).end {
-            break end;
+    let n = robot.joints.len();
+    let seen = environment.observation();
+    assert!(seen[n..2 * n].iter().any(|e| e.abs() > 0.1), "an encoder sees a joint's speed: {seen:?}");
+    assert!(seen[2 * n + 12..2 * n + 15].iter().all(|e| e.abs() < 1e-6), "nothing sees the base's: {seen:?}");
+}
+
+#[test]
+fn without_early_termination_not_even_a_fall_ends_an_episode() {
+    let (robot, reference) = prestoe();
+    let run = |ret: bool| {
+        let mut settings = small();
+        settings.termination.ret = ret;
+        let scene = Arc::new(Scene::new(Arc::clone(&robot), Arc::clone(&reference), settings).unwrap());
+        let mut environment = Environment::new(scene, 1, 0).unwrap();
+        environment.start(0).unwrap();
+        let action = vec![5.0; robot.joints.len()];
+        loop {
+            // So far away that only a fall is left to end it early.
+            if let Some(end) = environment.step(&action, 10.0).end {
+                break end;
+            }
         }
     };
-    assert!(matches!(end, End::Fell | End::Completed), "{end:?}");
+    assert_eq!(run(true), End::Fell);
+    assert_eq!(run(false), End::Completed);
 }
 
 #[test]
@@ -178,6 +196,27 @@ fn an_evaluation_is_the_same_twice_and_counts_what_it_says() {
     let upright = first.each.iter().filter(|tried| tried.upright).count() as f64 / 3.0;
     assert_eq!(first.upright_rate, upright);
     assert!(first.link_error_mean > 0.0);
+}
+
+#[test]
+fn spread_trials_start_all_over_the_clip() {
+    let (robot, _) = prestoe();
+    let policy = training(small()).policy();
+    let at = |start: f64, spread: bool, trials: usize, seed: u64| {
+        let evaluation = Evaluation { trials, seed, start, spread, ..Evaluation::default() };
+        evaluate(&robot, &policy, &evaluation, &|| ()).unwrap().each
+    };
+    let spread = at(0.0, true, 3, 1);
+    let [from, to] = policy.header.window;
+    let period = policy.header.follower.period;
+    for (i, seed) in [1, 2, 3].into_iter().enumerate() {
+        let start = (i as f64 / 3.0 * (to - from) / period).floor() * period;
+        assert_eq!(spread[i], at(start, false, 1, seed)[0], "trial {i} from {start} s");
+    }
+    assert_ne!(spread[1], at(0.0, false, 3, 1)[1]);
+    // Where the foot is at the ball already there is none.
+    let contact = policy.follower(&robot).unwrap().track().contact_time();
+    assert_eq!(at(contact, false, 1, 1)[0].direction_error_deg, None);
 }
 
 #[test]
