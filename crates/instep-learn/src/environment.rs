@@ -286,6 +286,7 @@ impl Environment {
         let settings = &scene.settings;
         self.follower.act(action);
         let substeps = (settings.follower.period / settings.world.step).round() as usize;
+        let weights = &settings.reward;
         let mut excess: f64 = 0.0;
         for k in 0..substeps {
             if k > 0 {
@@ -297,12 +298,11 @@ impl Environment {
                 return Step { reward: 0.0, deviation: Deviation::default(), end: Some(End::Diverged) };
             }
             self.suite.sense(&self.world);
-            excess = excess.max(reward::excess_speed(&scene.robot.joints, &self.world.v()[6..]));
+            excess = excess.max(reward::excess_speed(&scene.robot.joints, &self.world.v()[6..], weights.limit_from));
         }
         self.tick += 1;
         self.look();
         let deviation = scene.deviation(self.tick, self.world.q(), self.world.v(), &mut self.data);
-        let weights = &settings.reward;
         let mut reward = reward::imitation(weights, &deviation);
         let n = action.len().max(1) as f64;
         let square = |x: f32| f64::from(x) * f64::from(x);

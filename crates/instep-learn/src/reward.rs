@@ -22,14 +22,11 @@ pub struct Deviation {
     pub farthest: (f64, usize),
 }
 
-/// Share of its speed limit beyond which a joint's speed is penalised.
-pub const CLOSE_TO_LIMIT: f64 = 0.95;
-
-/// How far the joint speeds `v` (rad/s, n) are beyond [`CLOSE_TO_LIMIT`]: the sum over the joints of the excess, each
-/// in shares of its limit.
+/// How far the joint speeds `v` (rad/s, n) are beyond the share `from` of their limits: the sum over the joints of the
+/// excess, each in shares of its limit.
 #[must_use]
-pub fn excess_speed(joints: &[Joint], v: &[f64]) -> f64 {
-    joints.iter().zip(v).map(|(joint, v)| (v.abs() / joint.speed - CLOSE_TO_LIMIT).max(0.0)).sum()
+pub fn excess_speed(joints: &[Joint], v: &[f64], from: f64) -> f64 {
+    joints.iter().zip(v).map(|(joint, v)| (v.abs() / joint.speed - from).max(0.0)).sum()
 }
 
 /// Imitation reward (34), between 0 and 1.
@@ -76,10 +73,11 @@ mod tests {
         let robots = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots");
         let robot = instep_robot::Robot::load(&robots.join("nao")).unwrap();
         let mut v: Vec<f64> = robot.joints.iter().map(|joint| -0.94 * joint.speed).collect();
-        assert_eq!(excess_speed(&robot.joints, &v), 0.0);
+        assert_eq!(excess_speed(&robot.joints, &v, 0.95), 0.0);
+        assert!((excess_speed(&robot.joints, &v, 0.84) - 0.1 * v.len() as f64).abs() < 1e-9);
         v[0] = 1.05 * robot.joints[0].speed;
         v[3] = -1.25 * robot.joints[3].speed;
-        assert!((excess_speed(&robot.joints, &v) - 0.4).abs() < 1e-12);
+        assert!((excess_speed(&robot.joints, &v, 0.95) - 0.4).abs() < 1e-12);
     }
 
     #[test]

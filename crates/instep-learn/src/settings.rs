@@ -67,9 +67,11 @@ pub struct RewardSettings {
     pub w_rate: f64,
     /// Penalty on the mean square of the action; not in the paper, zero turns it off.
     pub w_action: f64,
-    /// Penalty on joint speeds beyond [`CLOSE_TO_LIMIT`](crate::reward::CLOSE_TO_LIMIT), which a landing can drive past
-    /// what the motor gives; not in the paper, zero turns it off.
+    /// Penalty on joint speeds close to their limits, which a landing can drive past what the motor gives; not in the paper,
+    /// zero turns it off.
     pub w_limit: f64,
+    /// Share of its limit beyond which a joint's speed is penalised.
+    pub limit_from: f64,
     /// w_ball of (38), once, as the ball leaves; zero while only tracking. The paper pays it at every step after the kick: by
     /// then nothing can be done for it, no observation tells it, and it is noise in the advantage of every later step.
     pub w_ball: f64,
@@ -95,6 +97,7 @@ impl Default for RewardSettings {
             w_rate: 0.02,
             w_action: 0.005,
             w_limit: 1.0,
+            limit_from: 0.95,
             w_ball: 0.0,
             ball_scale: 10.0,
             ball_cap: 16.0,
@@ -320,7 +323,9 @@ impl LearnSettings {
         for (name, factor) in [("k_k", reward.k_k), ("k_q", reward.k_q), ("k_v", reward.k_v), ("k_c", reward.k_c)] {
             check(&format!("reward.{name}"), factor, factor < 0.0, "a number below 0")?;
         }
-        for (name, value) in [("ball_scale", reward.ball_scale), ("ball_cap", reward.ball_cap)] {
+        for (name, value) in
+            [("limit_from", reward.limit_from), ("ball_scale", reward.ball_scale), ("ball_cap", reward.ball_cap)]
+        {
             check(&format!("reward.{name}"), value, value > 0.0, "a number above 0")?;
         }
         let end = &self.termination;

@@ -230,16 +230,16 @@ fn markdown(rows: &[Row], budget: u64, seeds: u64) -> String {
 /// The page: the table, and Fig 7's curves.
 fn page(rows: &[Row], text: &str) -> Report {
     let curves = |ret: bool| Plot {
-        title: format!("Imitation reward of a step, {} early termination", if ret { "with" } else { "without" }),
+        title: format!("Imitation return of an episode, {} early termination", if ret { "with" } else { "without" }),
         x_label: "control steps / million".into(),
-        y_label: "1 is perfect".into(),
+        y_label: "sum of the rewards, each at most 1".into(),
         axis: Axis::Other,
         series: rows
             .iter()
             .filter(|row| row.early_termination == ret)
             .flat_map(|row| {
                 row.curves.iter().enumerate().map(move |(i, curve)| {
-                    let points = curve.iter().map(|p| [p.steps as f64 / 1e6, p.reward]).collect();
+                    let points = curve.iter().filter_map(|p| Some([p.steps as f64 / 1e6, p.episode_return?])).collect();
                     Series::points(format!("{}, seed {}", row.reference, i + 1), points)
                 })
             })
