@@ -35,7 +35,7 @@ const KINDS: [(&str, &str, &str, &str); 3] = [
 #[derive(Debug, Args)]
 pub(crate) struct LearnTable {
     /// Control steps of each training
-    #[arg(long, value_name = "STEPS", default_value = "600k", value_parser = train::steps)]
+    #[arg(long, value_name = "STEPS", default_value = "1M", value_parser = train::steps)]
     budget: u64,
     /// Number of seeds, counted from 1
     #[arg(long, value_name = "N", default_value_t = 3)]
@@ -154,6 +154,14 @@ impl LearnTable {
                     return Err(Failure::input(format!("{}: {message}", saved.display())));
                 }
                 checkpoint::restore(&mut training, &saved)?;
+                let iteration = (settings.ppo.environments * settings.ppo.horizon) as u64;
+                if training.state.steps >= self.budget + iteration {
+                    let message = format!(
+                        "of {} control steps, more than --budget {}; give another --out, or a larger budget",
+                        training.state.steps, self.budget
+                    );
+                    return Err(Failure::input(format!("{}: {message}", saved.display())));
+                }
                 training.state.budget = self.budget;
             }
             bar.inc(training.state.steps.min(self.budget));
@@ -234,22 +242,35 @@ fn markdown(rows: &[Row], budget: u64, seeds: u64) -> String {
     lines.join("\n") + "\n"
 }
 
+/// Iterations whose returns are shown as one point.
+const POINT: usize = 8;
+
+/// Fig 7's curve of a row: control steps in millions, and the mean return of an episode over all seeds.
+fn curve(row: &Row) -> Vec<[f64; 2]> {
+    let length = row.curves.iter().map(Vec::len).min().unwrap_or(0);
+    (0..length)
+        .step_by(POINT)
+        .filter_map(|first| {
+            let point = || row.curves.iter().flat_map(|curve| &curve[first..(first + POINT).min(length)]);
+            let returns: Vec<f64> = point().filter_map(|p| p.episode_return).collect();
+            let mean = returns.iter().sum::<f64>() / returns.len() as f64;
+            let steps = point().last()?.steps as f64 / 1e6;
+            (!returns.is_empty()).then_some([steps, mean])
+        })
+        .collect()
+}
+
 /// The page: the table, and Fig 7's curves.
 fn page(rows: &[Row], text: &str) -> Report {
     let curves = |ret: bool| Plot {
-        title: format!("Imitation return of an episode, {} early termination", if ret { "with" } else { "without" }),
+        title: format!("Return of an episode, {} early termination", if ret { "with" } else { "without" }),
         x_label: "control steps / million".into(),
-        y_label: "sum of the rewards, each at most 1".into(),
+        y_label: "mean of the seeds".into(),
         axis: Axis::Other,
         series: rows
             .iter()
             .filter(|row| row.early_termination == ret)
-            .flat_map(|row| {
-                row.curves.iter().enumerate().map(move |(i, curve)| {
-                    let points = curve.iter().filter_map(|p| Some([p.steps as f64 / 1e6, p.episode_return?])).collect();
-                    Series::points(format!("{}, seed {}", row.reference, i + 1), points)
-                })
-            })
+            .map(|row| Series::points(row.reference, curve(row)))
             .collect(),
         ..Plot::default()
     };
