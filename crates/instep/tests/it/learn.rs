@@ -106,3 +106,33 @@ fn a_checkpoint_of_other_settings_is_not_gone_on_from() {
     let before = listing(at);
     assert_refused(&train("other.toml"), &["other settings", "--out"], at, &before);
 }
+
+#[test]
+fn the_table_compares_three_references_with_and_without_early_termination() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    small(at);
+    let table = |budget: &str| {
+        let arguments =
+            ["learn-table", "--settings", "small.toml", "--seeds", "2", "--trials", "2", "--budget", budget, "--json"];
+        instep(at, &arguments)
+    };
+    let rows = object(&table("512"))["rows"].as_array().unwrap().clone();
+    let cells: Vec<_> = rows
+        .iter()
+        .map(|row| (row["reference"].as_str().unwrap(), row["early_termination"].as_bool().unwrap()))
+        .collect();
+    let kinds = ["kinematic, foot slip kept", "kinematic, no foot slip", "kinodynamic"];
+    assert_eq!(cells, kinds.map(|kind| [(kind, false), (kind, true)]).concat());
+    for row in &rows {
+        let seeds: Vec<f64> =
+            row["link_error_seeds"].as_array().unwrap().iter().map(|error| error.as_f64().unwrap()).collect();
+        let mean = row["link_error_mean"].as_f64().unwrap();
+        assert!(seeds.len() == 2 && (0.5 * (seeds[0] + seeds[1]) - mean).abs() < 1e-12, "{row}");
+    }
+    let page = std::fs::read_to_string(at.join("out/learn-table/report.html")).unwrap();
+    assert!(page.contains("Return of an episode, without early termination"));
+    // The trainings are kept and are longer than what is asked for now.
+    let before = listing(at);
+    assert_refused(&table("256"), &["512 control steps", "--budget 256", "--out"], at, &before);
+}
