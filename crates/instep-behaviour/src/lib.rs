@@ -1,0 +1,1 @@
+//! Deciding: memory, targets, roles, kicks and gaze.

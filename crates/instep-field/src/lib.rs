@@ -1,0 +1,1 @@
+//! Soccer fields: lines, landmarks, goals, sides and the rules' numbers.

@@ -1,0 +1,1 @@
+//! Where am I: CLAP and the methods that it is compared with.

@@ -1,0 +1,1 @@
+//! Matches by the thousand: game simulator, rules and referee, GameController.

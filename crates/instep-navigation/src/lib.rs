@@ -1,0 +1,1 @@
+//! How do I get there: visibility graphs that count turns and collision-free predictive control.

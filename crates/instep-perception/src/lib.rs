@@ -1,0 +1,1 @@
+//! Seeing: camera frames, detector, ball, landmarks and obstacles.
