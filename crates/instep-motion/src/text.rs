@@ -22,7 +22,23 @@ pub(crate) struct Line<'a> {
 /// The whole file as text.
 pub(crate) fn read(file: &Path) -> Result<String, MotionError> {
     let bytes = std::fs::read(file).map_err(|source| MotionError::Read { file: file.to_owned(), source })?;
-    Ok(String::from_utf8_lossy(&bytes).into_owned())
+    Ok(decode(&bytes))
+}
+
+/// `bytes` as text, without the byte-order mark that some editors put first: UTF-8, or UTF-16 where the mark says so.
+/// What is neither is replaced by U+FFFD.
+#[must_use]
+pub fn decode(bytes: &[u8]) -> String {
+    let utf16 = |bytes: &[u8], unit: fn([u8; 2]) -> u16| {
+        let units = bytes.chunks_exact(2).map(|pair| unit([pair[0], pair[1]]));
+        char::decode_utf16(units).map(|c| c.unwrap_or(char::REPLACEMENT_CHARACTER)).collect()
+    };
+    match bytes {
+        [0xEF, 0xBB, 0xBF, rest @ ..] => String::from_utf8_lossy(rest).into_owned(),
+        [0xFF, 0xFE, rest @ ..] => utf16(rest, u16::from_le_bytes),
+        [0xFE, 0xFF, rest @ ..] => utf16(rest, u16::from_be_bytes),
+        _ => String::from_utf8_lossy(bytes).into_owned(),
+    }
 }
 
 /// The lines of `text` that hold something, without comments (from `comment` to the end of the line).
@@ -129,6 +145,17 @@ mod tests {
     fn lines_skip_comments_blanks_and_carriage_returns() {
         let got: Vec<_> = lines("# one\r\n\r\na b # c\r\n  d", Some('#')).map(|l| (l.number, l.words)).collect();
         assert_eq!(got, [(3, vec!["a", "b"]), (4, vec!["d"])]);
+    }
+
+    /// Issue 22: a text file with a byte-order mark was refused at its first line.
+    #[test]
+    fn issue_22_byte_order_marks_are_no_text() {
+        let utf16 = |unit: fn(u16) -> [u8; 2]| "\u{feff}Höhe 1".encode_utf16().flat_map(unit).collect::<Vec<_>>();
+        for bytes in
+            ["\u{feff}Höhe 1".as_bytes(), "Höhe 1".as_bytes(), &utf16(u16::to_le_bytes), &utf16(u16::to_be_bytes)]
+        {
+            assert_eq!(decode(bytes), "Höhe 1");
+        }
     }
 
     #[test]

@@ -39,6 +39,11 @@ pub(crate) fn check_file(file: &Path) -> Result<(), Failure> {
     check_folder(parent(file))
 }
 
+/// `file`, with `ending` where its name has none.
+pub(crate) fn with_ending(file: &Path, ending: &str) -> PathBuf {
+    if file.extension().is_some() { file.to_owned() } else { file.with_extension(ending) }
+}
+
 fn parent(file: &Path) -> &Path {
     file.parent().unwrap_or(Path::new(""))
 }
@@ -113,6 +118,15 @@ mod tests {
         batch.commit().unwrap();
         assert_eq!(std::fs::read_to_string(folder.path().join("deep/b")).unwrap(), "deep/b");
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2);
+    }
+
+    #[test]
+    fn names_get_an_ending_where_they_have_none() {
+        for (given, wanted) in
+            [("out/some", "out/some.json"), ("a.d/name", "a.d/name.json"), ("out/some.txt", "out/some.txt")]
+        {
+            assert_eq!(with_ending(Path::new(given), "json"), Path::new(wanted));
+        }
     }
 
     #[test]

@@ -14,6 +14,7 @@ use std::process::ExitCode;
 use clap::{Args, ValueEnum};
 use instep_motion::asf;
 use instep_motion::clip::{self, Clip, LoadOptions};
+use instep_motion::jump::{self, Continuous, Mended};
 use instep_motion::reference::{Reference, Source};
 use instep_retarget::RetargetError;
 use instep_retarget::kinematic::{self, ContactForm, KinematicSettings, Retargeted};
@@ -113,6 +114,8 @@ struct Settings {
 struct Done {
     robot: Robot,
     clip: Clip,
+    /// What was done about its jumps.
+    mended: Vec<Mended>,
     clip_file: PathBuf,
     form: Form,
     retargeted: Retargeted,
@@ -133,7 +136,7 @@ impl Retarget {
     /// When something handed in cannot be used, or the solver breaks down. A bar that is missed is no error.
     pub(crate) fn run(self, output: &Output) -> Result<ExitCode, Failure> {
         let mut line = Line::new();
-        let clip = self.load()?;
+        let Continuous { clip, mended, .. } = jump::without_jumps(&self.load()?);
         let robot = places::robot(&self.robot)?;
         let (reference, report) = self.outputs();
         for file in [&reference, &report] {
@@ -159,7 +162,8 @@ impl Retarget {
         };
         let seconds = line.finish();
         let (clip_file, form) = (self.clip, self.form);
-        let done = Done { robot, clip, clip_file, form, retargeted, kinodynamic, limits, seconds, reference, report };
+        let done =
+            Done { robot, clip, mended, clip_file, form, retargeted, kinodynamic, limits, seconds, reference, report };
         done.write()?;
         output.show(&Measures::new(&done), |paint| done.text(paint))?;
         Ok(done.code())
@@ -243,7 +247,7 @@ impl Retarget {
 
     /// Paths of the reference and of its report.
     fn outputs(&self) -> (PathBuf, PathBuf) {
-        let reference = self.out.clone().unwrap_or_else(|| {
+        let reference = self.out.as_deref().map(|out| files::with_ending(out, "json")).unwrap_or_else(|| {
             let stem = self.clip.file_stem().unwrap_or_default().to_string_lossy();
             let kind = match (self.stage, self.form) {
                 (_, Form::Slip) => "kinematic_slip",
@@ -252,7 +256,8 @@ impl Retarget {
             };
             Path::new("out/retarget").join(format!("{stem}_{kind}.json"))
         });
-        let report = self.report.clone().unwrap_or_else(|| reference.with_extension("html"));
+        let report = self.report.as_deref().map(|report| files::with_ending(report, "html"));
+        let report = report.unwrap_or_else(|| reference.with_extension("html"));
         (reference, report)
     }
 

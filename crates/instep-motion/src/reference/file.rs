@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use serde::Serialize;
 
 use super::Reference;
-use crate::MotionError;
+use crate::{MotionError, text};
 
 impl Reference {
     /// Reads and validates a reference.
@@ -20,8 +20,8 @@ impl Reference {
     /// [`MotionError::Read`] if the file cannot be read, [`MotionError::Syntax`] with the line if it is no JSON of this
     /// layout, [`MotionError::Content`] with the field if its values cannot be used ([`Self::validate`]).
     pub fn load(path: &Path) -> Result<Self, MotionError> {
-        let text = std::fs::read(path).map_err(|source| MotionError::Read { file: path.to_owned(), source })?;
-        let reference: Self = serde_json::from_slice(&text)
+        let text = text::read(path)?;
+        let reference: Self = serde_json::from_str(&text)
             .map_err(|error| MotionError::syntax(path, error.line().max(1), error.to_string(), "a reference (JSON)"))?;
         reference.validate().map_err(|error| of_file(path, error))?;
         Ok(reference)

@@ -7,6 +7,7 @@ use instep_bench::Subject;
 use instep_bench::cell::{Kicked, Ran, run_case};
 use instep_bench::scenario::Case;
 use instep_kick::KickRequest;
+use instep_motion::text;
 use instep_sim::World;
 use instep_sim::settings::{ModelError, WorldSettings};
 use serde::Serialize;
@@ -118,7 +119,8 @@ fn line(answer: &Answer) -> String {
 /// When the file cannot be read as such.
 pub(super) fn load(path: &Path) -> Result<Vec<KickRequest>, Failure> {
     let wrong = |detail: String| Failure::input(format!("{}: {detail} (--requests)", path.display()));
-    let text = std::fs::read_to_string(path).map_err(|e| wrong(format!("cannot be read: {e}; expected JSON")))?;
+    let bytes = std::fs::read(path).map_err(|e| wrong(format!("cannot be read: {e}; expected JSON")))?;
+    let text = text::decode(&bytes);
     if text.trim().is_empty() {
         return Err(wrong("holds no request; expected a JSON array of requests, or one request a line".into()));
     }

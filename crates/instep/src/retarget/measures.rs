@@ -13,8 +13,10 @@ use super::{Done, summary};
 
 #[derive(Debug, Serialize)]
 pub(super) struct Measures<'a> {
-    /// Frames of the clip.
+    /// Frames of the clip without its jumps; times are counted from the first of them.
     frames: usize,
+    /// Frames that were left out or bridged because the figure jumps there, in words.
+    jumps: Vec<String>,
     kick_foot: Side,
     t_plant: f64,
     t_swing: f64,
@@ -97,6 +99,7 @@ impl<'a> Measures<'a> {
         let result = done.result();
         Self {
             frames: done.clip.frames.len(),
+            jumps: done.mended.iter().map(ToString::to_string).collect(),
             kick_foot: r.phases.kick_foot,
             t_plant: r.phases.t_plant,
             t_swing: r.phases.t_swing,

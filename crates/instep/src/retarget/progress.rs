@@ -4,8 +4,10 @@
 use std::collections::BTreeMap;
 use std::time::Instant;
 
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 use instep_retarget::{kinematic, kinodynamic};
+
+use crate::output;
 
 /// The live line.
 pub(super) struct Line {
@@ -18,10 +20,7 @@ pub(super) struct Line {
 impl Line {
     /// A line that says that files are being read.
     pub(super) fn new() -> Self {
-        let bar = ProgressBar::new(0);
-        if let Ok(style) = ProgressStyle::with_template("{prefix:12} {bar:24} {pos:>3} of at most {len}, {wide_msg}") {
-            bar.set_style(style);
-        }
+        let bar = output::bar(0, "{prefix:12} {bar:24} {pos:>3} of at most {len}, {wide_msg}");
         Self { bar, stage: "reading", begin: Instant::now(), seconds: BTreeMap::new() }
     }
 

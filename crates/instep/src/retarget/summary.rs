@@ -127,6 +127,9 @@ impl Done {
             "clip",
             format!("{} frames at {:.0} Hz, {:.2} s", self.clip.frames.len(), self.clip.rate, self.clip.duration()),
         ));
+        for mended in &self.mended {
+            out.push_str(&row("", paint.warn(&mended.to_string())));
+        }
         let p = &r.phases;
         let phases = format!(
             "planted {:.3} s, swing {:.3} s, lock {:.3} s, impact {:.3} s",

@@ -199,3 +199,31 @@ fn ctrl_c_keeps_the_best_motion() {
     let done = not_feasible(folder.path(), &child.wait_with_output().unwrap(), 130);
     assert_eq!(done["status"], "stopped");
 }
+
+/// Issue 22: a conversion that begins with the rest pose, saved by an editor that writes a byte-order mark, was refused; and a
+/// reference called `some/name` had no ending.
+#[test]
+fn issue_22_a_rest_pose_a_mark_and_a_name_without_ending() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = std::fs::read_to_string(clip("kick.bvh")).unwrap();
+    let values = text.lines().last().unwrap().split_whitespace().count();
+    let (head, frames) = text.split_once("Frame Time: 0.0166667\n").unwrap();
+    let rest = vec!["0"; values].join(" ");
+    let head = head.replace("Frames: 48", "Frames: 49");
+    std::fs::write(folder.path().join("rest.bvh"), format!("\u{feff}{head}Frame Time: 0.0166667\n{rest}\n{frames}"))
+        .unwrap();
+    let bvh = clip("kick.bvh");
+    let run = |clip: &str, out: &str| {
+        let arguments = ["retarget", "--stage", "kinematic", "--json", "--unit", "0.01", "--clip", clip, "--out", out];
+        object(&instep(folder.path(), &arguments))
+    };
+    let (mended, plain) = (run("rest.bvh", "some/rest"), run(bvh.to_str().unwrap(), "some/plain.json"));
+    assert_eq!(mended["jumps"], serde_json::json!(["frame 1 left out: the figure jumps there"]));
+    assert_eq!(plain["jumps"], serde_json::json!([]));
+    for key in ["frames", "kick_foot", "t_impact", "violations"] {
+        assert_eq!(mended[key], plain[key], "{key}");
+    }
+    let written =
+        ["plain.html", "plain.json", "rest.html", "rest.json"].map(|name| folder.path().join("some").join(name));
+    assert_eq!(listing(&folder.path().join("some")), written);
+}
