@@ -3,6 +3,7 @@
 //! A reader that has gone (`instep kick | head -1`) is no error.
 
 use std::io::{IsTerminal, Write};
+use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
@@ -10,14 +11,35 @@ use serde::Serialize;
 use crate::failure::Failure;
 use crate::mujoco_log;
 
-/// A progress bar of `length` steps on standard error; hidden where nobody watches.
+/// How often work that no terminal watches tells how far it is, s.
+const HEARTBEAT: Duration = Duration::from_secs(60);
+
+/// A progress bar of `length` steps on standard error; where that is no terminal, a line a minute in its place.
 pub(crate) fn bar(length: u64, template: &str) -> ProgressBar {
     let bar = ProgressBar::new(length);
+    if !std::io::stderr().is_terminal() {
+        let weak = bar.downgrade();
+        std::thread::spawn(move || {
+            loop {
+                std::thread::sleep(HEARTBEAT);
+                let Some(bar) = weak.upgrade().filter(|bar| !bar.is_finished()) else { return };
+                // Nobody is left to be told when standard error is closed.
+                let _ = writeln!(std::io::stderr().lock(), "{}", heartbeat(&bar));
+            }
+        });
+    }
     // A template of ours that cannot be read is shown as the library's own.
     if let Ok(style) = ProgressStyle::with_template(template) {
         bar.set_style(style);
     }
     bar
+}
+
+/// How far `bar` is, as one line.
+fn heartbeat(bar: &ProgressBar) -> String {
+    let (at, length, minutes) = (bar.position(), bar.length().unwrap_or(0), bar.elapsed().as_secs() / 60);
+    let parts = [bar.prefix(), format!("{at} of {length} after {minutes} min"), bar.message()];
+    parts.iter().filter(|part| !part.is_empty()).map(String::as_str).collect::<Vec<_>>().join(", ")
 }
 
 /// How to speak to the user.
@@ -121,5 +143,20 @@ impl Paint {
         } else {
             self.good(&text)
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_heartbeat_tells_how_far_the_work_is() {
+        let bar = bar(200, "{pos}");
+        bar.set_position(30);
+        assert_eq!(heartbeat(&bar), "30 of 200 after 0 min");
+        bar.set_prefix("kinematic");
+        bar.set_message("cost 3");
+        assert_eq!(heartbeat(&bar), "kinematic, 30 of 200 after 0 min, cost 3");
     }
 }

@@ -133,7 +133,7 @@ impl Train {
         let stop = stopped_by_the_user();
         let bar = output::bar(training.state.budget, "{wide_bar} {human_pos}/{human_len} steps, {msg} {eta}");
         let (start, before) = (Instant::now(), training.state.steps);
-        let mut saved = Instant::now();
+        let mut saved: Option<Instant> = None;
         let mut failed = None;
         while !training.is_over() && !stop.load(Ordering::Relaxed) {
             match training.iterate() {
@@ -146,9 +146,10 @@ impl Train {
                     break;
                 }
             }
-            if saved.elapsed() > CHECKPOINT {
+            // The first one at once: a training killed early shall leave something behind.
+            if saved.is_none_or(|at| at.elapsed() > CHECKPOINT) {
                 checkpoint::save(&training, &files.checkpoint)?;
-                saved = Instant::now();
+                saved = Some(Instant::now());
             }
         }
         bar.finish_and_clear();
