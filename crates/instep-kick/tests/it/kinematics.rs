@@ -12,7 +12,7 @@ use crate::rig::robot;
 #[test]
 fn the_tree_agrees_with_mujoco() {
     let mut rng = ChaCha8Rng::seed_from_u64(5);
-    for name in ["nao", "wolfgang", "prestoe"] {
+    for name in ["nao", "wolfgang", "prestoe", "t1", "k1"] {
         let robot = robot(name);
         let tree = Tree::new(&robot);
         let (mut pose, mut data) = (tree.pose(), robot.data());
@@ -52,7 +52,7 @@ fn the_tree_agrees_with_mujoco() {
 #[test]
 fn it_finds_poses_that_exist_and_keeps_limits_for_those_that_do_not() {
     let mut rng = ChaCha8Rng::seed_from_u64(7);
-    for name in ["wolfgang", "prestoe"] {
+    for name in ["wolfgang", "prestoe", "t1", "k1"] {
         let robot = robot(name);
         let tree = Tree::new(&robot);
         let mut ik = Ik::new(&robot, &[], 0.0, 0.0).unwrap();
