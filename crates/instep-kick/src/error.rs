@@ -27,6 +27,18 @@ pub enum KickError {
         /// The reference's length, s.
         duration: f64,
     },
+    /// A robot without a part that a standing kick needs.
+    #[error(
+        "{robot}/robot.toml: leg.{side}.{part}: the robot has none, and a kick from the stand needs it: use --engine in-gait"
+    )]
+    MissingPart {
+        /// The robot.
+        robot: String,
+        /// The leg.
+        side: instep_motion::phase::Side,
+        /// The part, as `robot.toml` names it.
+        part: &'static str,
+    },
     /// A settings file that is missing or cannot be read.
     #[error("{file}: cannot be read: {detail}")]
     Read {

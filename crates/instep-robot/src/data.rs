@@ -19,6 +19,7 @@ pub struct RobotData {
     base: usize,
     mass: f64,
     jacobian: Vec<f64>,
+    drift_jacobian: Vec<f64>,
     acceleration: Vec<f64>,
 }
 
@@ -38,6 +39,7 @@ impl RobotData {
             base: robot.base,
             mass: robot.mass(),
             jacobian: vec![0.0; 3 * nv],
+            drift_jacobian: vec![0.0; 6 * nv],
             acceleration: vec![0.0; nv],
         };
         data.set_state(&robot.stand, &vec![0.0; nv]);
@@ -154,6 +156,27 @@ impl RobotData {
         }
     }
 
+    /// dJ/dt v of the point of `link` that is now at `world` (m) and of the link's rotation, world axes: the accelerations
+    /// (m/s^2, rad/s^2) that the point and the link would have with `v` constant.
+    pub fn drift(&mut self, link: usize, world: &Vector3<f64>) -> [Vector3<f64>; 2] {
+        let point = [world.x, world.y, world.z];
+        let nv = self.data.qvel().len();
+        let (linear, angular) = self.drift_jacobian.split_at_mut(3 * nv);
+        // SAFETY: as in `point_jacobian_into`; both halves have 3 nv numbers.
+        unsafe {
+            mujoco_c::mj_jacDot(
+                self.data.model().ffi(),
+                self.data.ffi(),
+                linear.as_mut_ptr(),
+                angular.as_mut_ptr(),
+                &raw const point,
+                i32::try_from(link).unwrap_or(0),
+            );
+        }
+        let (linear, angular) = self.drift_jacobian.split_at(3 * nv);
+        [times_v(linear, self.data.qvel()), times_v(angular, self.data.qvel())]
+    }
+
     /// Velocity of a point of a link in the world, m/s, for the speed that was set.
     pub fn point_velocity(&mut self, at: &LinkPoint) -> Vector3<f64> {
         let world = self.point(at);
@@ -216,6 +239,28 @@ impl RobotData {
         matrix
     }
 
+    /// As [`Self::mass_matrix`], row-major into `matrix` (nv x nv), without allocating.
+    ///
+    /// # Panics
+    /// When `matrix` has another length.
+    pub fn mass_matrix_into(&self, matrix: &mut [f64]) {
+        assert_eq!(matrix.len(), self.data.qvel().len().pow(2), "an nv x nv matrix");
+        // Its size is right, as asserted.
+        let _ = self.data.full_m(matrix);
+    }
+
+    /// Bias h(q, v) (nv) for the state that was set: M a + h = torques + J^T f. Coriolis, gravity, and damping where the
+    /// model has any; not dry friction.
+    ///
+    /// # Panics
+    /// When `bias` has another length.
+    pub fn bias_into(&mut self, bias: &mut [f64]) {
+        self.data.rne_into(false, bias);
+        for (bias, passive) in bias.iter_mut().zip(self.data.qfrc_passive()) {
+            *bias -= passive;
+        }
+    }
+
     /// Generalised forces (nv) that give the acceleration `a` (nv) in the state that was set while `forces` act on
     /// the robot: M a + h(q, v) - sum J^T f, equation (33) of paper 1. The first six are the wrench that the
     /// unactuated base would need: zero for a motion that is physically possible.
@@ -227,13 +272,13 @@ impl RobotData {
     pub fn inverse_dynamics_into(&mut self, a: &[f64], forces: &[(LinkPoint, Vector3<f64>)], torques: &mut [f64]) {
         // Newton-Euler for the bias, the mass matrix for the acceleration: MuJoCo's own recursion with acceleration
         // leaves the rotor inertias out.
-        self.data.rne_into(false, torques);
+        self.bias_into(torques);
         let mut inertial = std::mem::take(&mut self.acceleration);
         assert_eq!(inertial.len(), a.len(), "an acceleration of length nv");
         // SAFETY: model and data belong together; both vectors have nv numbers, as asserted.
         unsafe { mujoco_c::mj_mulM(self.data.model().ffi(), self.data.ffi(), inertial.as_mut_ptr(), a.as_ptr()) };
-        for ((torque, inertial), passive) in torques.iter_mut().zip(&inertial).zip(self.data.qfrc_passive()) {
-            *torque += inertial - passive;
+        for (torque, inertial) in torques.iter_mut().zip(&inertial) {
+            *torque += inertial;
         }
         self.acceleration = inertial;
         let nv = a.len();

@@ -60,8 +60,8 @@ pub struct Leg {
     pub knee: usize,
     /// Ankle pitch joint.
     pub ankle_pitch: usize,
-    /// Ankle roll joint.
-    pub ankle_roll: usize,
+    /// Ankle roll joint, where there is one; without it the foot rolls about the line of its contact points.
+    pub ankle_roll: Option<usize>,
     /// Toe joint, where there is one.
     pub toe: Option<usize>,
     /// Link between hip and knee.
@@ -81,8 +81,9 @@ pub struct Leg {
 impl Leg {
     /// Its joints from hip to toe.
     pub fn joints(&self) -> impl Iterator<Item = usize> {
-        [self.hip_yaw, self.hip_roll, self.hip_pitch, self.knee, self.ankle_pitch, self.ankle_roll]
+        [self.hip_yaw, self.hip_roll, self.hip_pitch, self.knee, self.ankle_pitch]
             .into_iter()
+            .chain(self.ankle_roll)
             .chain(self.toe)
     }
 }
@@ -173,7 +174,7 @@ impl Robot {
                 hip_pitch: joint("hip_pitch", &leg.hip_pitch)?,
                 knee: joint("knee", &leg.knee)?,
                 ankle_pitch: joint("ankle_pitch", &leg.ankle_pitch)?,
-                ankle_roll: joint("ankle_roll", &leg.ankle_roll)?,
+                ankle_roll: leg.ankle_roll.as_deref().map(|name| joint("ankle_roll", name)).transpose()?,
                 toe: leg.toe.as_deref().map(|name| joint("toe", name)).transpose()?,
                 thigh: names.link(&field("thigh"), &leg.thigh)?,
                 shank: names.link(&field("shank"), &leg.shank)?,

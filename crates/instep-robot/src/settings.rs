@@ -90,8 +90,8 @@ pub struct LegFile {
     pub knee: String,
     /// Ankle pitch.
     pub ankle_pitch: String,
-    /// Ankle roll.
-    pub ankle_roll: String,
+    /// Ankle roll, where there is one.
+    pub ankle_roll: Option<String>,
     /// Toe, where there is one.
     pub toe: Option<String>,
     /// Link between hip and knee.

@@ -1,1 +1,22 @@
-//! Walking: state estimate, footsteps, swing, whole-body control, kicks in the middle of a step.
+//! Walking of legged robots (paper 4, sections III and IV-F): from senses to joint commands.
+//!
+//! - [`StateEstimate`]: what walking knows of its robot, the seam between estimator and controller.
+//! - [`gait`]: stands, starts, steps, stops; [`footsteps`] chooses where to, [`swing`] how, [`whole_body`] with which torques,
+//!   by the quadratic program of [`qp`].
+//! - [`settings`]: all numbers, with defaults that follow from the robot's size.
+//!
+//! Maths only: no simulator, no clock, no camera, no field. A tick allocates nothing.
+
+mod error;
+pub mod footsteps;
+pub mod gait;
+pub mod qp;
+pub mod settings;
+mod state;
+pub mod swing;
+pub mod whole_body;
+
+pub use error::WalkError;
+pub use gait::Gait;
+pub use settings::{Velocity, WalkSettings};
+pub use state::StateEstimate;

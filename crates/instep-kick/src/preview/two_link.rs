@@ -22,7 +22,7 @@ use nalgebra::{Matrix3, Vector2, Vector3};
 use crate::KickError;
 use crate::ik::{Goals, Ik, Residual};
 use crate::tree::{Tree, TreePose};
-use crate::whole_body::body::Body;
+use crate::whole_body::body::{Body, ankle_roll};
 
 /// Largest turn of a joint in one step, rad.
 const STEP: f64 = 0.3;
@@ -77,14 +77,15 @@ impl TwoLink {
     pub(crate) fn new(body: &Body, coupled: &[[String; 2]], margin: f64, bend: f64) -> Result<Self, KickError> {
         let robot: &Robot = &body.robot;
         let leg = |side| Ik::of_leg(robot, coupled, margin, bend, side);
+        let support = |side| -> Result<Support, KickError> {
+            let leg = robot.leg(side);
+            let (roll, pitch) = ([ankle_roll(robot, side)?, leg.hip_roll], [leg.ankle_pitch, leg.hip_pitch]);
+            Ok(Support { sole: leg.sole, roll, pitch, knee: leg.knee })
+        };
         let ranges = robot.joints.iter().map(|joint| [joint.range[0] + margin, joint.range[1] - margin]).collect();
         Ok(Self {
             legs: [leg(Side::Left)?, leg(Side::Right)?],
-            supports: [0, 1].map(|side| {
-                let leg = &robot.legs[side];
-                let (roll, pitch) = ([leg.ankle_roll, leg.hip_roll], [leg.ankle_pitch, leg.hip_pitch]);
-                Support { sole: leg.sole, roll, pitch, knee: leg.knee }
-            }),
+            supports: [support(Side::Left)?, support(Side::Right)?],
             ranges,
         })
     }

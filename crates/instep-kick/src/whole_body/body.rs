@@ -49,8 +49,17 @@ pub(crate) struct Body {
     pub(crate) leg_length: f64,
 }
 
+/// The ankle roll joint of the leg on `side`, without which nobody stands on one foot.
+pub(crate) fn ankle_roll(robot: &Robot, side: Side) -> Result<usize, KickError> {
+    let missing = || KickError::MissingPart { robot: robot.name.clone(), side, part: "ankle_roll" };
+    robot.leg(side).ankle_roll.ok_or_else(missing)
+}
+
 impl Body {
     pub(crate) fn new(robot: Arc<Robot>, ball: BallModel, wanted: &BTreeMap<String, f64>) -> Result<Self, KickError> {
+        for side in [Side::Left, Side::Right] {
+            ankle_roll(&robot, side)?;
+        }
         let tree = Tree::new(&robot);
         let mut pose = tree.pose();
         let angles = robot.stand[7..].to_vec();

@@ -231,7 +231,7 @@ pub(crate) fn turn_ankles(
     let feet: &[Side] = if footing.both { &[Side::Left, Side::Right] } else { &[footing.swing.other()] };
     for side in feet {
         let leg = body.robot.leg(*side);
-        for joint in [leg.ankle_pitch, leg.ankle_roll] {
+        for joint in [Some(leg.ankle_pitch), leg.ankle_roll].into_iter().flatten() {
             command.torques[joint] -= now.axis[joint].dot(moment) / feet.len() as f64;
         }
     }

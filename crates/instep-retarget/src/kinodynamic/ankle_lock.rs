@@ -11,7 +11,7 @@ pub(crate) fn rows(plan: &Plan, c: &[f64], sink: &mut CoefficientSink) {
     let nv = plan.tree.nv;
     let leg = plan.robot.leg(plan.phases.kick_foot);
     let [first, last] = plan.lock;
-    for joint in [leg.ankle_pitch, leg.ankle_roll] {
+    for joint in [Some(leg.ankle_pitch), leg.ankle_roll].into_iter().flatten() {
         let scale = 1.0 / (plan.step * plan.robot.joints[joint].speed);
         for b in first..last + 2 {
             let i = b * nv + 6 + joint;

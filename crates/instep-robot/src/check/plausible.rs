@@ -77,9 +77,11 @@ fn standing(robot: &Robot, data: &RobotData, findings: &mut Findings) {
     findings.found("stand", format!("base {height:.3} m, centre of mass {:.3} m above the ground", com.z));
     for side in [Side::Left, Side::Right] {
         let bearing = robot.contacts.iter().filter(|contact| contact.leg == side);
-        if bearing.clone().count() < 3 {
-            let count = bearing.count();
+        let (count, rolls) = (bearing.count(), robot.leg(side).ankle_roll.is_none());
+        if count < 3 && !rolls {
             findings.doubtful("contact points", format!("{side:?}: {count}; a foot rolls over fewer than three"));
+        } else if rolls {
+            findings.found("contact points", format!("{side:?}: no ankle roll; the foot rolls, which walking can do"));
         }
     }
     let bearing: Vec<Vector2<f64>> = robot

@@ -95,7 +95,7 @@ fn a_bare_urdf_gets_a_robot_toml_that_loads() {
     let named = |joint: usize| robot.joints[joint].name.as_str();
     assert_eq!(named(leg.hip_yaw), "left_hip_yaw");
     assert_eq!(named(leg.knee), "left_knee");
-    assert_eq!(named(leg.ankle_roll), "left_ankle_roll");
+    assert_eq!(named(leg.ankle_roll.unwrap()), "left_ankle_roll");
     assert_eq!(robot.link_name(leg.thigh), "left_thigh");
     assert_eq!(robot.link_name(leg.foot), "left_foot");
     assert!(robot.contacts.len() == 8 && !leg.strike.is_empty());

@@ -29,6 +29,38 @@ fn by_differences<const ROWS: usize>(robot: &Robot, q: &[f64], f: impl Fn(&[f64]
 }
 
 #[test]
+fn drift_is_the_acceleration_at_constant_speed() {
+    for name in ROBOTS {
+        let robot = load(name);
+        let mut numbers = Numbers(11);
+        let mut data = robot.data();
+        let q = numbers.position(&robot);
+        let v: Vec<f64> = (0..robot.nv()).map(|_| 2.0 * numbers.next()).collect();
+        for leg in &robot.legs {
+            let velocities = |by: f64| {
+                let mut data = robot.data();
+                let mut q = q.clone();
+                data.integrate(&mut q, &v, by);
+                data.set_state(&q, &v);
+                let mut jacobian = vec![0.0; 3 * robot.nv()];
+                data.rotation_jacobian_into(leg.foot, &mut jacobian);
+                let turn = jacobian.chunks(robot.nv()).map(|row| row.iter().zip(&v).map(|(j, v)| j * v).sum::<f64>());
+                (data.point_velocity(&leg.sole), Vector3::from_iterator(turn))
+            };
+            let step = 1e-6;
+            let ((after, turn_after), (before, turn_before)) = (velocities(step), velocities(-step));
+            data.set_state(&q, &v);
+            let [linear, angular] = data.drift(leg.foot, &data.point(&leg.sole));
+            assert!((linear - (after - before) / (2.0 * step)).norm() < 1e-6 * (1.0 + linear.norm()), "{name}");
+            assert!(
+                (angular - (turn_after - turn_before) / (2.0 * step)).norm() < 1e-6 * (1.0 + angular.norm()),
+                "{name}"
+            );
+        }
+    }
+}
+
+#[test]
 fn jacobians_are_derivatives() {
     for name in ROBOTS {
         let robot = load(name);

@@ -6,7 +6,7 @@ use instep_robot::Robot;
 use proptest::prelude::*;
 
 /// The shipped robots.
-pub(crate) const ROBOTS: [&str; 3] = ["prestoe", "nao", "wolfgang"];
+pub(crate) const ROBOTS: [&str; 4] = ["prestoe", "nao", "wolfgang", "artemis"];
 
 /// The folder of a shipped robot.
 pub(crate) fn robot_folder(name: &str) -> PathBuf {

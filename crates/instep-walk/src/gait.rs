@@ -1,0 +1,521 @@
+//! The gait on a known state: stands, starts, steps, stops; chooses footholds, leads the swing foot and the body, and has the
+//! whole-body controller find the torques.
+//!
+//! On both feet the centre of mass is led; on one foot it falls as it must and the next foothold catches it
+//! ([`crate::footsteps`]). There is no double support between steps. A start shifts the weight over the first support foot; a
+//! stop is a step in place after which both feet stay. Estimates of the state come from outside ([`StateEstimate`]).
+
+use std::sync::Arc;
+
+use instep_motion::phase::Side;
+use instep_robot::control::JointCommand;
+use instep_robot::{Robot, RobotData};
+use nalgebra::{Rotation2, UnitQuaternion, Vector2, Vector3};
+
+use crate::footsteps::{Pendulum, PendulumState};
+use crate::settings::{GRAVITY, Velocity, WalkSettings};
+use crate::swing::{Swing, Waypoint};
+use crate::whole_body::{Outcome, Targets, WholeBody};
+use crate::{StateEstimate, WalkError};
+
+/// Farthest that the capture point may be from the middle of the feet, as a share of the width, when a gait ends.
+const STOP_CAPTURE: f64 = 0.45;
+/// Farthest apart that the feet may be ahead when a gait ends, as a share of the width.
+const STOP_STAGGER: f64 = 0.4;
+/// Farthest that the capture point may be from the feet's middle before a standing robot steps, as a share of the width.
+const BALANCE_CAPTURE: f64 = 0.42;
+/// Fastest change of the height of the centre of mass that is asked, as a share of the height a second.
+const HEIGHT_RATE: f64 = 0.35;
+
+/// What the gait does.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Mode {
+    /// Stands on both feet.
+    Stand,
+    /// On both feet, the weight going over `support`.
+    Shift {
+        /// The first support foot.
+        support: Side,
+    },
+    /// On `support`, the other foot swinging.
+    Step {
+        /// The support foot.
+        support: Side,
+    },
+}
+
+/// One step that was made.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Footstep {
+    /// When the foot came down, s.
+    pub time: f64,
+    /// The foot.
+    pub side: Side,
+    /// Where its reference point came down, m, odometry frame.
+    pub position: Vector3<f64>,
+    /// Heading of the gait, rad.
+    pub heading: f64,
+}
+
+/// How often something out of the ordinary happened.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Counts {
+    /// Control ticks.
+    pub ticks: usize,
+    /// Ticks whose problem was solved without joint ranges.
+    pub relaxed: usize,
+    /// Ticks without solution: the last accelerations were used, without their speed.
+    pub unsolved: usize,
+    /// Touchdowns taken for granted because the time was up.
+    pub late: usize,
+    /// Steps.
+    pub steps: usize,
+}
+
+/// What the gait wants and sees in a tick; for reports and for the kick.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GaitView {
+    /// What it does.
+    pub mode: Mode,
+    /// Phase of the step, 0 at lift-off, 1 when the foot is due.
+    pub phase: f64,
+    /// Momentum about the contact over m H, (L_y, -L_x) in the heading's axes, now and as wanted at the end of the step, m/s.
+    pub momentum: Vector2<f64>,
+    /// See `momentum`; as wanted at the end of the step.
+    pub wanted: Vector2<f64>,
+    /// The next foothold, odometry frame, m.
+    pub foothold: Vector3<f64>,
+    /// Heading, rad, odometry frame.
+    pub heading: f64,
+    /// Centre of mass, m, odometry frame.
+    pub com: Vector3<f64>,
+    /// Its velocity, m/s.
+    pub com_velocity: Vector3<f64>,
+    /// Reference points of both feet, m, odometry frame.
+    pub feet: [Vector3<f64>; 2],
+}
+
+/// The gait with all that it needs.
+#[derive(Debug)]
+pub struct Gait {
+    robot: Arc<Robot>,
+    settings: WalkSettings,
+    data: RobotData,
+    body: WholeBody,
+    pendulum: Pendulum,
+    mode: Mode,
+    /// When the present mode or step began, s.
+    since: f64,
+    last_time: f64,
+    heading: f64,
+    height: f64,
+    asked: Velocity,
+    velocity: Velocity,
+    /// Where the swing foot left the ground, m, and its heading then, rad.
+    lift_off: (Vector3<f64>, f64),
+    /// Waypoint of the swing foot at phase 1/2, m, odometry frame, for the present step.
+    waypoint: Option<Vector3<f64>>,
+    /// Centre of mass across at the beginning of a shift, m from the middle of the feet.
+    sway_from: f64,
+    reference: JointCommand,
+    started: bool,
+    counts: Counts,
+    view: GaitView,
+    footstep: Option<Footstep>,
+}
+
+impl Gait {
+    /// For `robot` with `settings`; stands.
+    ///
+    /// # Errors
+    /// When the robot has not what walking needs.
+    pub fn new(robot: Arc<Robot>, settings: WalkSettings) -> Result<Self, WalkError> {
+        WalkSettings::of(&robot)?;
+        let data = robot.data();
+        let body = WholeBody::new(Arc::clone(&robot), settings.control.clone());
+        let gait = &settings.gait;
+        let pendulum = Pendulum {
+            lambda: (GRAVITY / gait.height).sqrt(),
+            step_time: gait.step_time,
+            width: gait.width,
+            alpha: gait.alpha,
+        };
+        let zero = Vector3::zeros();
+        let view = GaitView {
+            mode: Mode::Stand,
+            phase: 0.0,
+            momentum: Vector2::zeros(),
+            wanted: Vector2::zeros(),
+            foothold: zero,
+            heading: 0.0,
+            com: zero,
+            com_velocity: zero,
+            feet: [zero; 2],
+        };
+        Ok(Self {
+            reference: JointCommand::zeros(robot.joints.len()),
+            height: data.com().z,
+            robot,
+            settings,
+            data,
+            body,
+            pendulum,
+            mode: Mode::Stand,
+            since: 0.0,
+            last_time: 0.0,
+            heading: 0.0,
+            asked: Velocity::default(),
+            velocity: Velocity::default(),
+            lift_off: (zero, 0.0),
+            waypoint: None,
+            sway_from: 0.0,
+            started: false,
+            counts: Counts::default(),
+            view,
+            footstep: None,
+        })
+    }
+
+    /// Asks for a velocity from now on; returns what the robot is allowed.
+    pub fn set_velocity(&mut self, velocity: Velocity) -> Velocity {
+        self.asked = self.settings.limits.clip(velocity);
+        self.asked
+    }
+
+    /// The settings.
+    #[must_use]
+    pub fn settings(&self) -> &WalkSettings {
+        &self.settings
+    }
+
+    /// What is seen and wanted.
+    #[must_use]
+    pub fn view(&self) -> &GaitView {
+        &self.view
+    }
+
+    /// The velocity that the gait is at on its way to what was asked.
+    #[must_use]
+    pub fn velocity(&self) -> Velocity {
+        self.velocity
+    }
+
+    /// The whole-body controller's last solution.
+    #[must_use]
+    pub fn body(&self) -> &WholeBody {
+        &self.body
+    }
+
+    /// What happened how often.
+    #[must_use]
+    pub fn counts(&self) -> Counts {
+        self.counts
+    }
+
+    /// The step that ended in the last tick, if one did.
+    #[must_use]
+    pub fn footstep(&self) -> Option<Footstep> {
+        self.footstep
+    }
+
+    /// Leads the present swing through `waypoint` (m, odometry frame) at phase 1/2; until the foot comes down.
+    pub fn set_waypoint(&mut self, waypoint: Vector3<f64>) {
+        self.waypoint = Some(waypoint);
+    }
+
+    /// One tick: reads `state`, writes `command`.
+    pub fn tick(&mut self, state: &StateEstimate, command: &mut JointCommand) {
+        self.data.set_state(&state.q, &state.v);
+        let period = if self.started { (state.time - self.last_time).max(0.0) } else { 0.0 };
+        self.last_time = state.time;
+        self.footstep = None;
+        self.look(state);
+        if !self.started {
+            self.started = true;
+            self.since = state.time;
+            self.heading = yaw(&self.data, &self.robot);
+            self.view.heading = self.heading;
+            self.height = self.view.com.z - self.ground();
+            self.reference.positions.copy_from_slice(&state.q[7..]);
+            self.reference.velocities.fill(0.0);
+        }
+        self.counts.ticks += 1;
+        self.approach(period);
+        self.change(state);
+        self.heading += self.velocity.turn * period;
+        self.view.heading = self.heading;
+        let lowest = self.height - HEIGHT_RATE * self.settings.gait.height * period;
+        self.height = self.settings.gait.height.max(lowest);
+        let targets = match self.mode {
+            Mode::Stand => self.stand(None),
+            Mode::Shift { support } => self.stand(Some(support)),
+            Mode::Step { support } => self.step(support, state.time),
+        };
+        let outcome = self.body.solve(&mut self.data, &targets);
+        self.command(state, period, outcome, command);
+    }
+
+    /// Positions and momentum of this tick.
+    fn look(&mut self, _state: &StateEstimate) {
+        let momentum = self.data.momentum();
+        self.view.com = self.data.com();
+        self.view.com_velocity = Vector3::new(momentum[0], momentum[1], momentum[2]) / self.robot.mass();
+        for (at, foot) in self.view.feet.iter_mut().zip(&self.body.feet) {
+            *at = self.data.point(&foot.reference);
+        }
+        self.view.mode = self.mode;
+    }
+
+    /// The pendulum's state about the reference of `support`, in the axes of `heading`.
+    fn pendulum_state(&mut self, support: Side, heading: f64) -> PendulumState {
+        let momentum = self.data.momentum();
+        let arm = self.view.com - self.view.feet[support as usize];
+        let about = Vector3::new(momentum[3], momentum[4], momentum[5])
+            + arm.cross(&Vector3::new(momentum[0], momentum[1], momentum[2]));
+        let scale = 1.0 / (self.robot.mass() * self.settings.gait.height);
+        let turn = Rotation2::new(-heading);
+        PendulumState { position: turn * arm.xy(), momentum: turn * Vector2::new(about.y, -about.x) * scale }
+    }
+
+    /// Height of the ground under the feet that carry, m.
+    fn ground(&self) -> f64 {
+        match self.mode {
+            Mode::Step { support } => self.view.feet[support as usize].z,
+            _ => 0.5 * (self.view.feet[0].z + self.view.feet[1].z),
+        }
+    }
+
+    /// The velocity goes toward what was asked as fast as the limits allow.
+    fn approach(&mut self, period: f64) {
+        let limits = &self.settings.limits;
+        let toward = |from: f64, to: f64, most: f64| from + (to - from).clamp(-most, most);
+        let (now, asked) = (&mut self.velocity, &self.asked);
+        if matches!(self.mode, Mode::Step { .. }) {
+            now.x = toward(now.x, asked.x, limits.acceleration * period);
+            now.y = toward(now.y, asked.y, limits.acceleration * period);
+            now.turn = toward(now.turn, asked.turn, limits.turn_acceleration * period);
+        } else {
+            *now = Velocity::default();
+        }
+    }
+
+    /// Changes of the mode: start, touchdown, stop.
+    fn change(&mut self, state: &StateEstimate) {
+        let gait = &self.settings.gait;
+        let elapsed = state.time - self.since;
+        match self.mode {
+            Mode::Stand => {
+                let [left, right] = self.view.feet;
+                let middle = 0.5 * (left + right);
+                let capture = self.view.com + self.view.com_velocity / self.pendulum.lambda - middle;
+                let across = Rotation2::new(-self.heading) * capture.xy();
+                if across.norm() > BALANCE_CAPTURE * gait.width {
+                    // A push: the foot on the side that it falls to carries, the other steps.
+                    let support = if across.y > 0.0 { Side::Left } else { Side::Right };
+                    self.lift(support, state.time);
+                } else if !self.asked.is_zero() {
+                    let leftward = self.asked.y > 0.0 || (self.asked.y == 0.0 && self.asked.turn > 0.0);
+                    self.sway_from = (Rotation2::new(-self.heading) * (self.view.com - middle).xy()).y;
+                    self.mode = Mode::Shift { support: if leftward { Side::Right } else { Side::Left } };
+                    self.since = state.time;
+                }
+            }
+            Mode::Shift { support } => {
+                if elapsed >= gait.start_time {
+                    self.lift(support, state.time);
+                }
+            }
+            Mode::Step { support } => {
+                let swing = support.other();
+                let phase = elapsed / gait.step_time;
+                let late = elapsed > gait.step_time + gait.latest;
+                if late || (phase > gait.earliest && state.contact[swing as usize]) {
+                    self.counts.late += usize::from(late && !state.contact[swing as usize]);
+                    self.counts.steps += 1;
+                    let position = self.view.feet[swing as usize];
+                    self.footstep = Some(Footstep { time: state.time, side: swing, position, heading: self.heading });
+                    if self.may_stop() {
+                        self.mode = Mode::Stand;
+                        self.since = state.time;
+                        self.waypoint = None;
+                    } else {
+                        self.lift(swing, state.time);
+                    }
+                }
+            }
+        }
+        self.view.mode = self.mode;
+    }
+
+    /// Whether both feet can keep the body where it is.
+    fn may_stop(&self) -> bool {
+        if !self.asked.is_zero() || !self.velocity.is_zero() {
+            return false;
+        }
+        let turn = Rotation2::new(-self.heading);
+        let [left, right] = self.view.feet.map(|foot| turn * foot.xy());
+        let capture =
+            turn * (self.view.com + self.view.com_velocity / self.pendulum.lambda).xy() - 0.5 * (left + right);
+        let width = self.settings.gait.width;
+        (left.x - right.x).abs() < STOP_STAGGER * width
+            && capture.x.abs() < STOP_CAPTURE * width
+            && capture.y.abs() < STOP_CAPTURE * width
+    }
+
+    /// The foot other than `support` leaves the ground.
+    fn lift(&mut self, support: Side, time: f64) {
+        let swing = support.other();
+        let foot = &self.body.feet[swing as usize];
+        let ahead = self.data.link_matrix(foot.reference.link).column(0).into_owned();
+        self.lift_off = (self.view.feet[swing as usize], self.heading + wrap(ahead.y.atan2(ahead.x) - self.heading));
+        self.mode = Mode::Step { support };
+        self.since = time;
+        self.waypoint = None;
+    }
+
+    fn base(&self) -> UnitQuaternion<f64> {
+        UnitQuaternion::from_euler_angles(0.0, self.settings.gait.lean, self.heading)
+    }
+
+    /// On both feet; with `support` the weight goes over it.
+    fn stand(&mut self, support: Option<Side>) -> Targets {
+        let [left, right] = self.view.feet;
+        let middle = 0.5 * (left + right);
+        let mut shift = Waypoint { position: middle, velocity: Vector3::zeros(), acceleration: Vector3::zeros() };
+        if let Some(support) = support {
+            let time = self.last_time - self.since;
+            let outward = if support == Side::Left { 1.0 } else { -1.0 };
+            let half = 0.5 * self.pendulum.lambda * self.pendulum.step_time;
+            let speed = outward * 0.5 * self.settings.gait.width * self.pendulum.lambda * half.tanh();
+            let across = sway(self.sway_from, speed, self.settings.gait.start_time, time);
+            let turn = Rotation2::new(self.heading);
+            let put = |at: &mut Vector3<f64>, across: f64| {
+                let moved = turn * Vector2::new(0.0, across);
+                at.x += moved.x;
+                at.y += moved.y;
+            };
+            put(&mut shift.position, across[0]);
+            put(&mut shift.velocity, across[1]);
+            put(&mut shift.acceleration, across[2]);
+        }
+        self.view.phase = 0.0;
+        Targets {
+            support: [true; 2],
+            base: self.base(),
+            turn: 0.0,
+            height: [middle.z + self.height, 0.0],
+            shift: Some(shift),
+            swing: None,
+            swing_pitch: 0.0,
+        }
+    }
+
+    /// On `support`.
+    fn step(&mut self, support: Side, time: f64) -> Targets {
+        let gait = &self.settings.gait;
+        let (step_time, gain) = (gait.step_time, 1.0 / gait.speed_gain);
+        let ([near, far], reach) = (gait.across, gait.reach);
+        let (clearance, landing_speed) = (gait.clearance, gait.landing_speed);
+        let elapsed = time - self.since;
+        let phase = elapsed / step_time;
+        let left = (step_time - elapsed).max(0.0);
+        let swing = support.other();
+        // Frames turn: the foothold is chosen in the axes that the gait will have at the touchdown.
+        let heading = self.heading + self.velocity.turn * left;
+        let state = self.pendulum_state(support, heading);
+        let velocity = Vector2::new(self.velocity.x * gain, self.velocity.y);
+        let mut step = self.pendulum.foothold(&state, left, velocity, self.velocity.turn, swing);
+        let outward = if swing == Side::Left { 1.0 } else { -1.0 };
+        step.x = step.x.clamp(-reach, reach);
+        step.y = outward * (outward * step.y).clamp(near, far);
+        let moved = Rotation2::new(heading) * step;
+        let contact = self.view.feet[support as usize];
+        let foothold = contact + Vector3::new(moved.x, moved.y, 0.0);
+        let way = Swing {
+            from: self.lift_off.0,
+            waypoint: self.waypoint,
+            clearance,
+            to: foothold,
+            landing_speed,
+            duration: step_time,
+        };
+        // The swing foot turns to the heading of the middle of its stance.
+        let to = heading + 0.5 * self.velocity.turn * step_time;
+        let (turned, rate) = ease(self.lift_off.1, to, phase, step_time);
+        self.view.phase = phase;
+        self.view.momentum = state.momentum;
+        self.view.wanted = self.pendulum.wanted(Vector2::new(self.velocity.x, self.velocity.y), support);
+        self.view.foothold = foothold;
+        let mut carries = [false; 2];
+        carries[support as usize] = true;
+        Targets {
+            support: carries,
+            base: self.base(),
+            turn: self.velocity.turn,
+            height: [contact.z + self.height, 0.0],
+            shift: None,
+            swing: Some((swing, way.at(phase), [turned, rate])),
+            swing_pitch: 0.0,
+        }
+    }
+
+    /// Torques, with a joint reference that is integrated from the accelerations and leaks to what is measured.
+    fn command(&mut self, state: &StateEstimate, period: f64, outcome: Outcome, command: &mut JointCommand) {
+        match outcome {
+            Outcome::Solved => {}
+            Outcome::Relaxed => self.counts.relaxed += 1,
+            Outcome::Unsolved => {
+                // The last torques, and the drives brake the joints where they are.
+                self.counts.unsolved += 1;
+                self.reference.velocities.fill(0.0);
+                command.velocities.fill(0.0);
+                command.positions.copy_from_slice(&state.q[7..]);
+                return;
+            }
+        }
+        let share = 1.0 - (-self.settings.drive.leak * period).exp();
+        for j in 0..self.robot.joints.len() {
+            let (q, v) = (state.q[7 + j], state.v[6 + j]);
+            let (position, velocity) = (&mut self.reference.positions[j], &mut self.reference.velocities[j]);
+            *position += *velocity * period + share * (q - *position);
+            *velocity += self.body.acceleration[6 + j] * period + share * (v - *velocity);
+            command.positions[j] = *position;
+            command.velocities[j] = *velocity;
+            command.torques[j] = self.body.torques[j];
+        }
+    }
+}
+
+/// A quintic from rest at `from` (m) to 0 with `speed` (m/s) and no acceleration after `duration` (s): position, velocity,
+/// acceleration at `time`.
+fn sway(from: f64, speed: f64, duration: f64, time: f64) -> [f64; 3] {
+    let s = (time / duration).clamp(0.0, 1.0);
+    let r = 1.0 - s;
+    // 1 - smoothstep, and the arrival of the swing polynomial.
+    let fall =
+        [1.0 - s * s * s * (10.0 - 15.0 * s + 6.0 * s * s), -30.0 * s * s * r * r, -60.0 * s * r * (1.0 - 2.0 * s)];
+    let arrive = [
+        s * s * s * (-4.0 + 7.0 * s - 3.0 * s * s),
+        s * s * (-12.0 + 28.0 * s - 15.0 * s * s),
+        s * (-24.0 + 84.0 * s - 60.0 * s * s),
+    ];
+    let value = |k: usize| from * fall[k] + speed * duration * arrive[k];
+    [value(0), value(1) / duration, value(2) / (duration * duration)]
+}
+
+/// An angle that goes smoothly from `from` to `to` over phases 0 to 1, with its rate.
+fn ease(from: f64, to: f64, phase: f64, duration: f64) -> (f64, f64) {
+    let s = phase.clamp(0.0, 1.0);
+    let way = to - from;
+    (from + way * s * s * (3.0 - 2.0 * s), way * 6.0 * s * (1.0 - s) / duration)
+}
+
+fn wrap(angle: f64) -> f64 {
+    angle.sin().atan2(angle.cos())
+}
+
+/// Heading of the base, rad.
+fn yaw(data: &RobotData, robot: &Robot) -> f64 {
+    let ahead = data.link_matrix(robot.base).column(0).into_owned();
+    ahead.y.atan2(ahead.x)
+}

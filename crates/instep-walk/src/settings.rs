@@ -1,0 +1,378 @@
+//! Everything that walking can be told, with a default for each robot that follows from its size (`robot.toml`), and what its
+//! `walk.toml` says otherwise.
+//!
+//! Lengths scale with the height H of the centre of mass, times with sqrt(H / g), moments with m g H: the defaults are those
+//! that walk ARTEMIS (H 0.705 m), and they walk others.
+
+use std::path::Path;
+
+use instep_motion::phase::Side;
+use instep_robot::Robot;
+use serde::{Deserialize, Serialize};
+
+use crate::WalkError;
+
+/// Acceleration of free fall, m/s^2.
+pub(crate) const GRAVITY: f64 = 9.81;
+/// The settings' file in a robot's folder.
+const FILE: &str = "walk.toml";
+
+/// A walking velocity in the robot's heading frame.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Velocity {
+    /// Ahead, m/s.
+    pub x: f64,
+    /// To the left, m/s.
+    pub y: f64,
+    /// Counter-clockwise, rad/s.
+    pub turn: f64,
+}
+
+impl Velocity {
+    /// Whether it is a stand.
+    #[must_use]
+    pub fn is_zero(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
+/// How a robot walks.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WalkSettings {
+    /// The gait.
+    pub gait: Gait,
+    /// What may be asked.
+    pub limits: Limits,
+    /// Weights and gains of the whole-body controller.
+    pub control: Control,
+    /// What goes to the drives.
+    pub drive: Drive,
+}
+
+/// The gait.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Gait {
+    /// Time of a step, s. Shorter is safer across, longer faster.
+    pub step_time: f64,
+    /// Distance between the feet across, m.
+    pub width: f64,
+    /// Height of the centre of mass over the ground, m. Too high and the knee is straight at the end of a step: the robot vaults.
+    pub height: f64,
+    /// Height of the swing foot at mid-swing, m.
+    pub clearance: f64,
+    /// Share of the momentum error that a step takes away; 1 over-steps as soon as the body rises.
+    pub alpha: f64,
+    /// Real mean speed over that of the pendulum: what it leaves out (the swing leg, the ankle).
+    pub speed_gain: f64,
+    /// How fast the foot comes down, m/s.
+    pub landing_speed: f64,
+    /// Phase before which a contact of the swing foot is not a touchdown.
+    pub earliest: f64,
+    /// How long after its time a touchdown is taken for granted, s.
+    pub latest: f64,
+    /// Farthest foothold ahead or back, m.
+    pub reach: f64,
+    /// Nearest and farthest foothold across, m: no crossing, no split.
+    pub across: [f64; 2],
+    /// Time on both feet at a start, in which the weight goes over the first support foot, s.
+    pub start_time: f64,
+    /// Forward lean of the base, rad.
+    pub lean: f64,
+}
+
+/// What may be asked.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Limits {
+    /// Fastest ahead, m/s.
+    pub forward: f64,
+    /// Fastest back, m/s.
+    pub backward: f64,
+    /// Fastest sideways, m/s.
+    pub sideways: f64,
+    /// Fastest turn, rad/s.
+    pub turn: f64,
+    /// Largest change of the velocity ahead and across, m/s^2.
+    pub acceleration: f64,
+    /// Largest change of the turn, rad/s^2.
+    pub turn_acceleration: f64,
+}
+
+/// Weights (1), stiffnesses (1/s^2) and dampings (1/s) of the whole-body controller's tasks.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Control {
+    /// Contact points of a foot on the ground stay where they are.
+    pub stance: Task,
+    /// Base orientation about x and y.
+    pub base: Task,
+    /// Base orientation about z.
+    pub base_yaw: Task,
+    /// Height of the centre of mass.
+    pub height: Task,
+    /// Centre of mass over the ground, on both feet.
+    pub shift: Task,
+    /// Swing foot's place.
+    pub swing: Task,
+    /// Swing foot's orientation.
+    pub swing_turn: Task,
+    /// Arms and neck.
+    pub arms: Task,
+    /// Legs' posture: what the other tasks leave free.
+    pub legs: Task,
+    /// Weight of a moment of the ground about the contact, 1/(N m)^2: without it the centre of pressure wanders.
+    pub moment: f64,
+    /// Yaw momentum about the centre of mass is damped.
+    pub yaw_momentum: Task,
+    /// Friction between sole and ground that the forces keep; below what is there.
+    pub friction: f64,
+    /// Largest force on one contact point, as a share of the weight.
+    pub largest_force: f64,
+    /// How far ahead joint limits are seen, s.
+    pub look_ahead: f64,
+    /// Share of the drives' torque that is used.
+    pub torque_share: f64,
+}
+
+/// A task: how much it counts and how it is followed.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Task {
+    /// Weight.
+    pub weight: f64,
+    /// Stiffness, 1/s^2.
+    pub kp: f64,
+    /// Damping, 1/s.
+    pub kd: f64,
+}
+
+impl Task {
+    const fn new(weight: f64, kp: f64, kd: f64) -> Self {
+        Self { weight, kp, kd }
+    }
+}
+
+/// What goes to the drives besides the torque.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Drive {
+    /// How fast the integrated joint reference goes back to what is measured, 1/s. Smaller leans more on the drives' own
+    /// stiffness, which makes up for friction.
+    pub leak: f64,
+}
+
+impl WalkSettings {
+    /// What follows from the robot alone.
+    ///
+    /// # Errors
+    /// Which part of the robot walking needs and it has not.
+    pub fn of(robot: &Robot) -> Result<Self, WalkError> {
+        let missing = |missing: String, expected: &str| {
+            Err(WalkError::Robot { robot: robot.name.clone(), missing, expected: expected.into() })
+        };
+        for side in [Side::Left, Side::Right] {
+            let points = robot.contacts.iter().filter(|contact| contact.leg == side).count();
+            let least = if robot.leg(side).ankle_roll.is_some() { 3 } else { 2 };
+            if points < least {
+                return missing(
+                    format!("leg.{side} has {points} contact points"),
+                    if least == 3 {
+                        "at least 3 [[contact]] a foot with ankle roll"
+                    } else {
+                        "at least 2 [[contact]] a foot"
+                    },
+                );
+            }
+        }
+        let data = robot.data();
+        let ground = |side: usize| data.point(&robot.legs[side].sole);
+        let width = ground(0).y - ground(1).y;
+        let standing = data.com().z;
+        if !(width > 0.02 && standing > 0.05) {
+            return missing(
+                format!(
+                    "in the standing pose the soles are {width:.3} m apart and the centre of mass {standing:.3} m high"
+                ),
+                "the left foot to the left of the right one, and [stand] a stand",
+            );
+        }
+        let height = 0.91 * standing;
+        let time = (height / GRAVITY).sqrt();
+        // Gains are in units of the pendulum's time: 0.268 s for ARTEMIS.
+        let rate = 0.268 / time;
+        let task = |weight: f64, kp: f64, kd: f64| Task::new(weight, kp * rate.powi(2).min(2.0), kd * rate.min(1.4));
+        Ok(Self {
+            gait: Gait {
+                step_time: 1.49 * time,
+                width: 1.1 * width,
+                height,
+                clearance: 0.1 * height,
+                alpha: 0.9,
+                speed_gain: 0.92,
+                landing_speed: 0.15 * (height / 0.705).sqrt(),
+                earliest: 0.7,
+                latest: 0.11 * time,
+                reach: 0.92 * height,
+                across: [0.5 * width, 0.78 * height],
+                start_time: 3.0 * time,
+                lean: 0.03,
+            },
+            limits: Limits {
+                forward: 0.57 * (GRAVITY * height).sqrt(),
+                backward: 0.2 * (GRAVITY * height).sqrt(),
+                sideways: 0.152 * (GRAVITY * height).sqrt(),
+                turn: 1.2,
+                acceleration: 0.15 * GRAVITY,
+                turn_acceleration: 2.0,
+            },
+            control: Control {
+                stance: task(50.0, 0.0, 30.0),
+                base: task(30.0, 200.0, 28.0),
+                base_yaw: task(10.0, 100.0, 20.0),
+                height: task(1000.0, 120.0, 22.0),
+                shift: task(30.0, 100.0, 20.0),
+                swing: task(300.0, 500.0, 40.0),
+                swing_turn: task(20.0, 400.0, 35.0),
+                arms: task(2.0, 60.0, 12.0),
+                legs: task(0.02, 60.0, 12.0),
+                // 0.2 for ARTEMIS; fitted to what other robots wanted (PresToe 0.5, Wolfgang 5, NAO 10).
+                moment: 0.2 * (259.0 / (robot.mass() * GRAVITY * height)).powf(1.3),
+                yaw_momentum: task(0.002, 0.0, 10.0),
+                friction: 0.6,
+                largest_force: 2.5,
+                look_ahead: 0.06,
+                torque_share: 1.0,
+            },
+            drive: Drive { leak: 10.0 },
+        })
+    }
+
+    /// [`Self::of`], changed by the `walk.toml` of the robot's folder, if there is one.
+    ///
+    /// # Errors
+    /// As [`Self::of`], or when the file is not what it should be.
+    pub fn load(robot: &Robot) -> Result<Self, WalkError> {
+        let file = robot.folder().join(FILE);
+        if !file.exists() {
+            return Self::of(robot);
+        }
+        let text = std::fs::read_to_string(&file)
+            .map_err(|e| WalkError::Read { file: file.display().to_string(), detail: e.to_string() })?;
+        Self::parse(robot, &file, &text)
+    }
+
+    /// [`Self::of`], changed by `text`, the content of `file`.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn parse(robot: &Robot, file: &Path, text: &str) -> Result<Self, WalkError> {
+        let wrong = |detail: String| WalkError::Parse {
+            file: file.display().to_string(),
+            detail: detail.trim_end().to_owned(),
+        };
+        let changes: toml::Table = toml::from_str(text).map_err(|e| wrong(e.to_string()))?;
+        let mut whole = toml::Table::try_from(Self::of(robot)?).map_err(|e| wrong(e.to_string()))?;
+        merge(&mut whole, changes);
+        let settings: Self = whole.try_into().map_err(|e: toml::de::Error| wrong(e.to_string()))?;
+        settings.validate(file)?;
+        Ok(settings)
+    }
+
+    fn validate(&self, file: &Path) -> Result<(), WalkError> {
+        let check = |field: &str, value: f64, good: bool, expected: &str| {
+            if good && value.is_finite() {
+                return Ok(());
+            }
+            let (file, field) = (file.display().to_string(), field.to_owned());
+            Err(WalkError::Setting { file, field, found: value.to_string(), expected: expected.into() })
+        };
+        let (gait, limits, control) = (&self.gait, &self.limits, &self.control);
+        check("gait.step_time", gait.step_time, (0.05..=2.0).contains(&gait.step_time), "0.05 to 2 s")?;
+        check("gait.alpha", gait.alpha, (0.5..=1.0).contains(&gait.alpha), "0.5 to 1")?;
+        check("gait.earliest", gait.earliest, (0.3..=1.0).contains(&gait.earliest), "0.3 to 1")?;
+        for (field, value) in [
+            ("gait.width", gait.width),
+            ("gait.height", gait.height),
+            ("gait.clearance", gait.clearance),
+            ("gait.speed_gain", gait.speed_gain),
+            ("gait.landing_speed", gait.landing_speed),
+            ("gait.latest", gait.latest),
+            ("gait.reach", gait.reach),
+            ("gait.across[0]", gait.across[0]),
+            ("gait.start_time", gait.start_time),
+            ("limits.acceleration", limits.acceleration),
+            ("limits.turn_acceleration", limits.turn_acceleration),
+            ("control.friction", control.friction),
+            ("control.largest_force", control.largest_force),
+            ("control.look_ahead", control.look_ahead),
+            ("control.torque_share", control.torque_share),
+        ] {
+            check(field, value, value > 0.0, "a number above 0")?;
+        }
+        check("gait.across[1]", gait.across[1], gait.across[1] > gait.across[0], "more than gait.across[0]")?;
+        check("gait.lean", gait.lean, gait.lean.abs() < 0.5, "within 0.5 rad")?;
+        for (field, value) in [
+            ("limits.forward", limits.forward),
+            ("limits.backward", limits.backward),
+            ("limits.sideways", limits.sideways),
+            ("limits.turn", limits.turn),
+            ("control.moment", control.moment),
+            ("drive.leak", self.drive.leak),
+        ] {
+            check(field, value, value >= 0.0, "a number of at least 0")?;
+        }
+        for (name, task) in [
+            ("stance", control.stance),
+            ("base", control.base),
+            ("base_yaw", control.base_yaw),
+            ("height", control.height),
+            ("shift", control.shift),
+            ("swing", control.swing),
+            ("swing_turn", control.swing_turn),
+            ("arms", control.arms),
+            ("legs", control.legs),
+            ("yaw_momentum", control.yaw_momentum),
+        ] {
+            for (part, value) in [("weight", task.weight), ("kp", task.kp), ("kd", task.kd)] {
+                check(&format!("control.{name}.{part}"), value, value >= 0.0, "a number of at least 0")?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Limits {
+    /// The velocity nearest to `asked` that the robot is allowed: an ellipse ahead and across, and the turn.
+    #[must_use]
+    pub fn clip(&self, asked: Velocity) -> Velocity {
+        let ahead = if asked.x < 0.0 { self.backward } else { self.forward };
+        let finite = |value: f64| if value.is_finite() { value } else { 0.0 };
+        let (x, y, turn) = (finite(asked.x), finite(asked.y), finite(asked.turn));
+        let share = |value: f64, limit: f64| {
+            if limit > 0.0 {
+                value / limit
+            } else if value == 0.0 {
+                0.0
+            } else {
+                f64::INFINITY
+            }
+        };
+        let size = share(x, ahead).hypot(share(y, self.sideways));
+        let scale = if size > 1.0 { 1.0 / size } else { 1.0 };
+        let held = |value: f64, limit: f64| (value * scale).clamp(-limit, limit);
+        Velocity { x: held(x, ahead), y: held(y, self.sideways), turn: turn.clamp(-self.turn, self.turn) }
+    }
+}
+
+fn merge(whole: &mut toml::Table, changes: toml::Table) {
+    for (key, change) in changes {
+        match (whole.get_mut(&key), change) {
+            (Some(toml::Value::Table(inner)), toml::Value::Table(change)) => merge(inner, change),
+            (_, change) => {
+                whole.insert(key, change);
+            }
+        }
+    }
+}
