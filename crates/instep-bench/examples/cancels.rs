@@ -53,7 +53,7 @@ fn one(subject: &Subject, scenario: &Scenario, world: &mut World, seed: u64) -> 
         suite.read_into(0.0, &mut sensors);
         let Ok(plan) = engine.plan(&case.request, &sensors) else { continue };
         let mut command = JointCommand::zeros(robot.joints.len());
-        let far = (engine.control_period() / world.settings().step.far).round() as usize;
+        let far = (engine.control_period() / world.settings().step.tick).round() as usize;
         let mut cancelled = false;
         let mut end = 2.0 * plan.duration + 1.0;
         while world.time() < end {

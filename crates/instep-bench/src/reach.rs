@@ -121,7 +121,7 @@ impl Bed {
         let mut suite = SensorSuite::new(&self.world, 0);
         suite.sense(&self.world);
         let duration = self.probe.start(line);
-        let period = (self.probe.control_period() / self.world.settings().step.far).round().max(1.0) as usize;
+        let period = (self.probe.control_period() / self.world.settings().step.tick).round().max(1.0) as usize;
         let mut last = None;
         while self.world.time() < duration && !has_fallen(&self.world) {
             suite.read_into(self.world.time(), &mut self.sensors);

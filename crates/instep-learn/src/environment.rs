@@ -113,7 +113,7 @@ impl Scene {
         let far = self.settings.world.step;
         let per_far = (far / default.near).round().max(1.0);
         WorldSettings {
-            step: StepSettings { far, near: far / per_far, ..default },
+            step: StepSettings { tick: far, far, near: far / per_far, ..default },
             sensors: self.settings.world.sensors,
             ..WorldSettings::default()
         }

@@ -168,7 +168,7 @@ fn kick(robot: &Arc<Robot>, policy: &Policy, evaluation: &Evaluation, world: &mu
         world: evaluation.world,
         seed: evaluation.seed,
         duration: end.max(contact + UPRIGHT) - evaluation.start,
-        control_period: evaluation.world.step.far,
+        control_period: evaluation.world.step.tick,
         q,
         v,
         ball: BallState::at_rest(ball),

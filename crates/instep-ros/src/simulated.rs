@@ -48,7 +48,7 @@ impl SimBody {
         let suite = SensorSuite::new(&world, seed);
         let data = robot.data();
         // A rounding of a small positive number.
-        let far_steps = (period / settings.step.far).round().max(1.0) as usize;
+        let far_steps = (period / settings.step.tick).round().max(1.0) as usize;
         let mut body = Self { robot, world, suite, data, spot, far_steps, fell_at: None };
         body.stand_up()?;
         Ok(body)

@@ -21,7 +21,7 @@ pub struct SensorSuite {
     /// Whether any reading is noisy.
     noisy: bool,
     rng: ChaCha8Rng,
-    /// Readings of the last far steps, the newest at `newest`; as many as the longest delay needs.
+    /// Readings of the last ticks, the newest at `newest`; as many as the longest delay needs.
     history: Vec<Sensors>,
     newest: usize,
     delay: usize,
@@ -36,7 +36,7 @@ impl SensorSuite {
     pub fn new(world: &World, seed: u64) -> Self {
         let robot = world.robot();
         let noise = world.settings().sensors;
-        let steps = |delay: f64| (delay / world.settings().step.far).round() as usize;
+        let steps = |delay: f64| (delay / world.settings().step.tick).round() as usize;
         let (delay, ball_delay) = (steps(noise.delay), steps(noise.delay + noise.ball_delay));
         let joints = robot.joints.len();
         let blank = Sensors {
@@ -59,7 +59,7 @@ impl SensorSuite {
         }
     }
 
-    /// Reads every sensor once; to be called after each far step, and once at the start.
+    /// Reads every sensor once; to be called after each tick, and once at the start.
     pub fn sense(&mut self, world: &World) {
         let first = self.imu_velocity.is_none();
         let mut draw = |deviation: f64| {
@@ -84,7 +84,7 @@ impl SensorSuite {
         let rate = Vector3::new(v[3], v[4], v[5]);
         now.gyro = [0, 1, 2].map(|k| rate[k] + draw(noise.gyro));
         let imu_velocity = Vector3::new(v[0], v[1], v[2]) + world_from_base * rate.cross(&robot.imu.point);
-        let acceleration = (imu_velocity - self.imu_velocity.unwrap_or(imu_velocity)) / world.settings().step.far;
+        let acceleration = (imu_velocity - self.imu_velocity.unwrap_or(imu_velocity)) / world.settings().step.tick;
         self.imu_velocity = Some(imu_velocity);
         let specific = world_from_base.inverse() * (acceleration + Vector3::new(0.0, 0.0, 9.81));
         now.accelerometer = [0, 1, 2].map(|k| specific[k] + draw(noise.accelerometer));

@@ -110,7 +110,10 @@ impl Default for ImpactLaw {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Step {
-    /// Step away from the ball, s; also the period at which commands are taken.
+    /// Period at which commands are taken and sensors are read, s; a whole multiple of the far step. It belongs to the robot,
+    /// not to the integration: a re-run in finer steps keeps it.
+    pub tick: f64,
+    /// Step away from the ball, s.
     pub far: f64,
     /// Step near the ball, s; the far step is a whole multiple of it.
     pub near: f64,
@@ -120,11 +123,24 @@ pub struct Step {
 
 impl Default for Step {
     fn default() -> Self {
-        Self { far: 0.002, near: 0.00025, near_distance: 0.005 }
+        Self { tick: 0.002, far: 0.002, near: 0.00025, near_distance: 0.005 }
     }
 }
 
 impl Step {
+    /// How many far steps make a tick.
+    #[must_use]
+    pub fn far_per_tick(&self) -> usize {
+        // Validated to be a small whole number.
+        (self.tick / self.far).round().max(1.0) as usize
+    }
+
+    /// The same ticks in steps a `factor`th as long.
+    #[must_use]
+    pub fn finer(&self, factor: f64) -> Self {
+        Self { far: self.far / factor, near: self.near / factor, ..*self }
+    }
+
     /// How many near steps make a far one.
     #[must_use]
     pub fn near_per_far(&self) -> usize {
@@ -151,7 +167,7 @@ pub struct SensorNoise {
     pub contact_force: f64,
     /// Ball position, m on each horizontal axis.
     pub ball: f64,
-    /// Delay of all readings, s; rounded to whole far steps.
+    /// Delay of all readings, s; rounded to whole ticks.
     pub delay: f64,
     /// Further delay of the ball's sight, s.
     pub ball_delay: f64,
@@ -192,9 +208,12 @@ impl WorldSettings {
         positive("step.far", self.step.far)?;
         positive("step.near", self.step.near)?;
         positive("step.near_distance", self.step.near_distance)?;
-        let multiple = self.step.far / self.step.near;
-        let whole = (multiple - multiple.round()).abs() < 1e-6 && (1.0..=10_000.0).contains(&multiple.round());
-        check("step.near", self.step.near, whole, "a whole fraction of step.far")?;
+        positive("step.tick", self.step.tick)?;
+        let whole = |multiple: f64| {
+            (multiple - multiple.round()).abs() < 1e-6 && (1.0..=10_000.0).contains(&multiple.round())
+        };
+        check("step.far", self.step.far, whole(self.step.tick / self.step.far), "a whole fraction of step.tick")?;
+        check("step.near", self.step.near, whole(self.step.far / self.step.near), "a whole fraction of step.far")?;
         let noise = &self.sensors;
         for (field, value) in [
             ("joint_position", noise.joint_position),

@@ -36,7 +36,7 @@ pub struct TrialSettings {
     pub seed: u64,
     /// Length of the trial, s.
     pub duration: f64,
-    /// Period at which the controller is called, s; rounded to whole far steps.
+    /// Period at which the controller is called, s; rounded to whole ticks.
     pub control_period: f64,
     /// Robot's position at the start, 7 + n.
     pub q: Vec<f64>,
@@ -93,7 +93,7 @@ pub struct SegmentPeak {
     pub time: f64,
 }
 
-/// Samples at every far step; one row of `width` numbers a sample.
+/// Samples at every tick; one row of `width` numbers a sample.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Record {
     /// Times, s.
@@ -194,8 +194,8 @@ pub fn run_disturbed(
     controller: &mut dyn Controller,
 ) -> Result<Trial, SimError> {
     let robot = Arc::clone(world.robot());
-    let far = settings.world.step.far;
-    let whole = |time: f64| (time / far).round().max(1.0) as usize;
+    let tick = settings.world.step.tick;
+    let whole = |time: f64| (time / tick).round().max(1.0) as usize;
     let (steps, period) = (whole(settings.duration), whole(settings.control_period));
 
     world.reset(&settings.q, &settings.v, &settings.ball)?;

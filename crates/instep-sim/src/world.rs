@@ -3,8 +3,8 @@
 //! All contacts are explicit pairs: soles and body with the ground, striking geoms with the ball, the ball with the
 //! ground, and the robot's own self-collision pairs; nothing else touches. Drives are computed here at every physics
 //! step from the command and the state, so that no controller can ask for more torque or speed than the motors have.
-//! The far step is also the period at which commands are taken; while the ball is near a striking geom it is divided
-//! into near steps (facts/mujoco-from-rust.md, section 5).
+//! Commands are taken once a tick, which is a whole number of far steps; while the ball is near a striking geom a far
+//! step is divided into near steps (facts/mujoco-from-rust.md, section 5).
 
 use std::sync::Arc;
 
@@ -186,23 +186,23 @@ impl World {
         Ok(())
     }
 
-    /// Advances one far step under `command`, in near steps while the ball is near; tells `watch` of every near step.
+    /// Advances one tick under `command`, in far steps, or near ones while the ball is near; tells `watch` of every step.
     ///
     /// # Errors
     /// When the command or the state is no longer finite.
     pub fn advance(&mut self, command: &JointCommand, mut watch: Option<&mut ImpactWatch>) -> Result<(), SimError> {
-        self.near = self.is_near();
-        if !self.near {
-            self.step(command, self.settings.step.far)?;
-            return Ok(());
-        }
-        for _ in 0..self.settings.step.near_per_far() {
-            if let Some(watch) = watch.as_deref_mut() {
-                watch.before(self);
-            }
-            self.step(command, self.settings.step.near)?;
-            if let Some(watch) = watch.as_deref_mut() {
-                watch.after(self);
+        let step = self.settings.step;
+        for _ in 0..step.far_per_tick() {
+            self.near = self.is_near();
+            let (count, dt) = if self.near { (step.near_per_far(), step.near) } else { (1, step.far) };
+            for _ in 0..count {
+                if let Some(watch) = watch.as_deref_mut() {
+                    watch.before(self);
+                }
+                self.step(command, dt)?;
+                if let Some(watch) = watch.as_deref_mut() {
+                    watch.after(self);
+                }
             }
         }
         Ok(())

@@ -160,7 +160,7 @@ impl Kick {
             world,
             seed: self.seed,
             duration,
-            control_period: world.step.far,
+            control_period: world.step.tick,
             q,
             v,
             ball: BallState::at_rest([x, y, world.ball.radius]),

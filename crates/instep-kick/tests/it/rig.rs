@@ -64,7 +64,7 @@ impl Rig {
         suite.sense(&world);
         let mut sensors = Sensors::default();
         suite.read_into(0.0, &mut sensors);
-        let far = (engine.control_period() / settings.step.far).round() as usize;
+        let far = (engine.control_period() / settings.step.tick).round() as usize;
         Self { engine, world, suite, sensors, command: JointCommand::zeros(robot.joints.len()), far }
     }
 
