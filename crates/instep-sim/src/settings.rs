@@ -123,7 +123,7 @@ pub struct Step {
 
 impl Default for Step {
     fn default() -> Self {
-        Self { tick: 0.002, far: 0.002, near: 0.00025, near_distance: 0.005 }
+        Self { tick: 0.002, far: 0.001, near: 0.00025, near_distance: 0.005 }
     }
 }
 
@@ -209,9 +209,8 @@ impl WorldSettings {
         positive("step.near", self.step.near)?;
         positive("step.near_distance", self.step.near_distance)?;
         positive("step.tick", self.step.tick)?;
-        let whole = |multiple: f64| {
-            (multiple - multiple.round()).abs() < 1e-6 && (1.0..=10_000.0).contains(&multiple.round())
-        };
+        let whole =
+            |multiple: f64| (multiple - multiple.round()).abs() < 1e-6 && (1.0..=10_000.0).contains(&multiple.round());
         check("step.far", self.step.far, whole(self.step.tick / self.step.far), "a whole fraction of step.tick")?;
         check("step.near", self.step.near, whole(self.step.far / self.step.near), "a whole fraction of step.far")?;
         let noise = &self.sensors;

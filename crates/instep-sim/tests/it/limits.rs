@@ -1,7 +1,7 @@
 //! Torque and speed limits live in the world, whatever a controller asks for.
 
 use instep_robot::control::{Controller, JointCommand, Sensors};
-use instep_sim::settings::WorldSettings;
+use instep_sim::settings::{Step, WorldSettings};
 use instep_sim::trial::{TrialSettings, run};
 use instep_sim::{BallState, World};
 
@@ -22,8 +22,10 @@ fn a_greedy_controller_gets_no_more_than_the_motors_have() {
     let robot = robot("prestoe");
     let mut q = robot.stand.clone();
     q[2] += 2.0;
+    // A tick of one step: every torque is recorded beside the speed at which it was given.
+    let step = Step { tick: 0.001, far: 0.001, ..Step::default() };
     let settings = TrialSettings {
-        world: WorldSettings::default(),
+        world: WorldSettings { step, ..WorldSettings::default() },
         seed: 1,
         duration: 0.6,
         control_period: 0.002,
