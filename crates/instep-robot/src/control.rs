@@ -72,18 +72,20 @@ pub fn torque_range(joint: &Joint, speed: f64) -> [f64; 2] {
 
 /// As [`torque_range`], for a torque that is held over a whole time step: what the law allows at the speed that the
 /// torque itself leads to, so that a strong motor on a light link does not overshoot its speed limit within the step.
-/// `step_over_inertia` is the step (s) over the least inertia that the motor can find before it (kg m^2).
+/// `step_over_inertia` is the step (s) over the least inertia that the motor can find before it (kg m^2); `voltage` is the
+/// supply's as a share of the nominal one: the speed limit falls with it.
 #[must_use]
-pub fn torque_range_over_step(joint: &Joint, speed: f64, step_over_inertia: f64) -> [f64; 2] {
+pub fn torque_range_over_step(joint: &Joint, speed: f64, step_over_inertia: f64, voltage: f64) -> [f64; 2] {
     // On the falling line the law is torque = slope (limit - v); at the end of the step v + torque step / inertia.
     let slope = joint.torque / (joint.speed * (1.0 - joint.corner));
     let most = |toward: f64| {
-        (slope * (joint.speed - toward) / (1.0 + slope * step_over_inertia)).clamp(-joint.torque, joint.torque)
+        (slope * (voltage * joint.speed - toward) / (1.0 + slope * step_over_inertia))
+            .clamp(-joint.torque, joint.torque)
     };
     [-most(-speed), most(speed)]
 }
 
-/// The torque (N m) of `joint`'s drive for the targets `position`, `velocity` and `torque` at the measured `q` and
+/// The torque (N m) of an ideal drive of `joint` (no delay, no play; takes everything) for the targets `position`, `velocity` and `torque` at the measured `q` and
 /// `v`: proportional-derivative control plus the added torque, within what the motor can give.
 #[must_use]
 pub fn drive_torque(joint: &Joint, position: f64, velocity: f64, torque: f64, q: f64, v: f64) -> f64 {

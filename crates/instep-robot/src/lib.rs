@@ -18,6 +18,7 @@ mod capsule;
 pub mod check;
 pub mod control;
 mod data;
+pub mod drive;
 mod error;
 mod meshes;
 mod model_file;

@@ -5,6 +5,7 @@ use std::path::Path;
 use mujoco_rs::prelude::*;
 
 use crate::RobotError;
+use crate::drive::{DriveSettings, Pid};
 use crate::robot::Joint;
 use crate::settings::RobotFile;
 
@@ -111,6 +112,11 @@ pub(crate) fn joints(
             corner: 0.0,
             kp: 0.0,
             kd: 0.0,
+            pid: Pid::default(),
+            dead_zone: 0.0,
+            play: 0.0,
+            static_friction: 0.0,
+            viscous_friction: 0.0,
         });
     }
     for (g, group) in settings.group.iter().enumerate() {
@@ -120,6 +126,13 @@ pub(crate) fn joints(
             } else {
                 Err(names.wrong(&format!("group[{g}].{part}"), value.to_string(), format!("a number above 0 {unit}")))
             }
+        };
+        let not_negative = |part: &str, value: f64, most: f64, unit: &str| {
+            if (0.0..=most).contains(&value) {
+                return Ok(value);
+            }
+            let most = if most.is_finite() { format!("in [0, {most}]") } else { "of at least 0".into() };
+            Err(names.wrong(&format!("group[{g}].{part}"), value.to_string(), format!("a number {most} {unit}")))
         };
         if !(0.0..1.0).contains(&group.corner) {
             let field = format!("group[{g}].corner");
@@ -142,6 +155,15 @@ pub(crate) fn joints(
             joint.corner = group.corner;
             joint.kp = positive("kp", group.kp, "N m/rad")?;
             joint.kd = positive("kd", group.kd, "N m s/rad")?;
+            joint.pid = group.pid.unwrap_or(Pid { p: group.kp, i: 0.0, d: 0.0 });
+            positive("pid.p", joint.pid.p, "N m/rad")?;
+            not_negative("pid.i", joint.pid.i, f64::INFINITY, "N m/(rad s)")?;
+            not_negative("pid.d", joint.pid.d, f64::INFINITY, "N m s/rad")?;
+            let range = joint.range[1] - joint.range[0];
+            joint.dead_zone = not_negative("dead_zone", group.dead_zone, range, "rad, within the joint's range")?;
+            joint.play = not_negative("play", group.play, range, "rad, within the joint's range")?;
+            joint.viscous_friction =
+                not_negative("viscous_friction", group.viscous_friction, f64::INFINITY, "N m s/rad")?;
             if let Some(torque) = group.torque {
                 joint.torque = positive("torque", torque, "N m")?;
             }
@@ -149,6 +171,8 @@ pub(crate) fn joints(
                 let field = format!("group[{g}].torque");
                 return Err(names.wrong(&field, format!("none, and the model has none for \"{name}\""), "N m".into()));
             }
+            joint.static_friction =
+                not_negative("static_friction", group.static_friction, joint.torque, "N m, at most the torque")?;
         }
     }
     if let Some(joint) = joints.iter().find(|joint| joint.group == usize::MAX) {
@@ -176,4 +200,18 @@ pub(crate) fn self_collision(names: &Names<'_>, settings: &RobotFile) -> Result<
         pairs.push(pair);
     }
     Ok(pairs)
+}
+
+/// What a robot's drives share, checked.
+pub(crate) fn drives(names: &Names<'_>, drives: &DriveSettings) -> Result<DriveSettings, RobotError> {
+    for (part, value, good, expected) in [
+        ("period", drives.period, (0.0001..=0.1).contains(&drives.period), "a cycle of 0.0001 to 0.1 s"),
+        ("delay", drives.delay, (0.0..=0.2).contains(&drives.delay), "a delay of 0 to 0.2 s"),
+        ("sag", drives.sag, (0.0..=0.9).contains(&drives.sag), "a share in [0, 0.9]"),
+    ] {
+        if !good {
+            return Err(names.wrong(&format!("drives.{part}"), value.to_string(), expected.into()));
+        }
+    }
+    Ok(*drives)
 }

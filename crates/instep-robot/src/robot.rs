@@ -13,8 +13,9 @@ use mujoco_rs::wrappers::mj_editing::MjSpec;
 use nalgebra::Vector3;
 
 use crate::RobotError;
+use crate::drive::{DriveSettings, Pid};
 use crate::model_file::{sane, spec};
-use crate::names::{Names, joint_index, joints, self_collision};
+use crate::names::{Names, drives, joint_index, joints, self_collision};
 use crate::settings::{LegFile, PointFile, RobotFile};
 
 /// One actuated joint. Its position in [`Robot::joints`] is its index in every joint vector.
@@ -32,10 +33,20 @@ pub struct Joint {
     pub speed: f64,
     /// Share of the speed limit from which the torque falls; see [`crate::control::torque_range`].
     pub corner: f64,
-    /// Drive stiffness, N m/rad.
+    /// Stiffness of a torque drive or an ideal one, N m/rad.
     pub kp: f64,
-    /// Drive damping, N m s/rad.
+    /// Damping of a torque drive or an ideal one, N m s/rad.
     pub kd: f64,
+    /// A position servo's own PID.
+    pub pid: Pid,
+    /// Position error up to which the drive does nothing, rad.
+    pub dead_zone: f64,
+    /// Play of the gears, from flank to flank, rad.
+    pub play: f64,
+    /// Dry friction, N m.
+    pub static_friction: f64,
+    /// Viscous friction beside the motor's back-EMF, N m s/rad.
+    pub viscous_friction: f64,
 }
 
 /// A point fixed to a link.
@@ -114,6 +125,8 @@ pub struct Robot {
     pub joints: Vec<Joint>,
     /// Names of the joint groups.
     pub groups: Vec<String>,
+    /// What its drives take, how often and how late.
+    pub drives: DriveSettings,
     /// MuJoCo body index of the base link.
     pub base: usize,
     /// The inertial sensor, with the base link's axes.
@@ -228,6 +241,7 @@ impl Robot {
             title: settings.title.clone(),
             joints,
             groups,
+            drives: drives(&names, &settings.drives)?,
             base,
             imu: LinkPoint { link: base, point: settings.base.imu.into() },
             legs,

@@ -5,6 +5,8 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use crate::drive::{DriveSettings, Pid};
+
 /// A whole `robot.toml`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -17,6 +19,9 @@ pub struct RobotFile {
     pub model: String,
     /// The floating base.
     pub base: BaseFile,
+    /// What its drives take, how often and how late; absent, torque drives at 1 kHz without delay.
+    #[serde(default)]
+    pub drives: DriveSettings,
     /// Joints that share limits and gains; every joint of the model is in exactly one.
     pub group: Vec<GroupFile>,
     /// Joint angles of the pose that it stands in, rad; joints not named are at zero.
@@ -60,10 +65,24 @@ pub struct GroupFile {
     /// Share of the speed limit up to which the full torque is available, in [0, 1). From there it falls linearly
     /// to zero at the limit. 0 is a motor without current limit, 0.9 one whose current limit binds first.
     pub corner: f64,
-    /// Drive stiffness, N m/rad. Larger follows closer and shakes sooner.
+    /// Stiffness of a torque drive or an ideal one, N m/rad. Larger follows closer and shakes sooner.
     pub kp: f64,
-    /// Drive damping, N m s/rad.
+    /// Damping of a torque drive or an ideal one, N m s/rad.
     pub kd: f64,
+    /// A position servo's own PID; absent, P is `kp` and the motor's back-EMF alone damps.
+    pub pid: Option<Pid>,
+    /// Position error up to which the drive does nothing, rad.
+    #[serde(default)]
+    pub dead_zone: f64,
+    /// Play of the gears, from flank to flank, rad.
+    #[serde(default)]
+    pub play: f64,
+    /// Dry friction of joint and gears, N m.
+    #[serde(default)]
+    pub static_friction: f64,
+    /// Viscous friction, N m s/rad; without the motor's back-EMF, which is in the torque-speed line.
+    #[serde(default)]
+    pub viscous_friction: f64,
 }
 
 /// Both legs.

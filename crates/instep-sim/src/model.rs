@@ -7,7 +7,7 @@ use mujoco_rs::prelude::*;
 use mujoco_rs::wrappers::mj_editing::{MjSpec, SpecItem};
 
 use crate::contact_law::{SOLIMP, solref};
-use crate::settings::{ModelError, WorldSettings};
+use crate::settings::{Fidelity, ModelError, WorldSettings};
 
 /// Names of ground and ball, their geoms and the ball's joint.
 pub(crate) const FLOOR: &str = "instep_floor";
@@ -55,10 +55,17 @@ pub(crate) fn build(spec: &mut MjSpec, robot: &Robot, settings: &WorldSettings) 
                 body.ipos_mut().iter_mut().zip(error.base_shift).for_each(|(at, shift)| *at += shift);
             }
         }
-        for joint in spec.joint_iter_mut() {
-            if let Some(limits) = robot.joint_index(joint.name()).map(|j| &robot.joints[j]) {
-                joint.set_frictionloss(error.joint_friction * limits.torque);
-            }
+    }
+    let as_built = settings.drives == Fidelity::AsBuilt;
+    for joint in spec.joint_iter_mut() {
+        let Some(limits) = robot.joint_index(joint.name()).map(|j| &robot.joints[j]) else { continue };
+        let [dry, viscous] = if as_built { [limits.static_friction, limits.viscous_friction] } else { [0.0; 2] };
+        let dry = dry + error.joint_friction * limits.torque;
+        if dry > 0.0 {
+            joint.set_frictionloss(joint.frictionloss() + dry);
+        }
+        if viscous > 0.0 {
+            joint.damping_mut()[0] += viscous;
         }
     }
 

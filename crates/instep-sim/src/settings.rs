@@ -17,10 +17,23 @@ pub struct WorldSettings {
     pub impact: ImpactLaw,
     /// Time steps.
     pub step: Step,
+    /// The robot's drives.
+    pub drives: Fidelity,
     /// Sensor noise and delay.
     pub sensors: SensorNoise,
     /// How the robot in the world differs from the model that its controller knows.
     pub model_error: ModelError,
+}
+
+/// Whether a part of the robot is as `robot.toml` says that it was built.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Fidelity {
+    /// As `robot.toml` has it.
+    AsBuilt,
+    /// Perfect: drives take angle, speed and torque at every step, at once, without play and friction.
+    #[default]
+    Ideal,
 }
 
 /// How the robot in the world differs from the model that its controller knows.

@@ -10,13 +10,14 @@ use std::sync::Arc;
 
 use instep_robot::Robot;
 use instep_robot::control::{JointCommand, drive_torque, torque_range_over_step};
+use instep_robot::drive::{Drives, Measured};
 use mujoco_rs::prelude::*;
 use nalgebra::{Matrix3, Vector3};
 
 use crate::SimError;
 use crate::impact::ImpactWatch;
 use crate::model::{BALL, FLOOR, build, foot_links};
-use crate::settings::WorldSettings;
+use crate::settings::{Fidelity, WorldSettings};
 
 /// Far steps before a possible contact from which the near step holds: one that is taken, one by which what MuJoCo last
 /// computed is late, and one for what speeds up meanwhile.
@@ -60,6 +61,7 @@ pub struct JointPeak {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Snapshot {
     state: Vec<f64>,
+    drives: Option<Drives>,
     time: f64,
     work: f64,
 }
@@ -77,6 +79,8 @@ pub struct World {
     contact_of_geom: Vec<Option<usize>>,
     /// For each geom of the world: whether it belongs to the robot's body above the feet.
     is_body: Vec<bool>,
+    /// `None`: ideal ones.
+    drives: Option<Drives>,
     peaks: Vec<JointPeak>,
     time: f64,
     work: f64,
@@ -135,6 +139,7 @@ impl World {
             .collect();
         let joints = robot.joints.len();
         let mut world = Self {
+            drives: (settings.drives == Fidelity::AsBuilt).then(|| Drives::new(&robot)),
             robot,
             settings: *settings,
             data: MjData::try_new(Box::new(model)).map_err(|e| refused(e.to_string()))?,
@@ -179,6 +184,9 @@ impl World {
         qvel[nv..nv + 3].copy_from_slice(&ball.velocity);
         qvel[nv + 3..nv + 6].copy_from_slice(&ball.angular_velocity);
         self.data.forward();
+        if let Some(drives) = &mut self.drives {
+            drives.reset();
+        }
         self.peaks.fill(JointPeak::default());
         self.time = 0.0;
         self.work = 0.0;
@@ -194,6 +202,9 @@ impl World {
         let step = self.settings.step;
         for _ in 0..step.far_per_tick() {
             self.near = self.is_near();
+            if let Some(drives) = &mut self.drives {
+                drives.offer(self.time, command);
+            }
             let (count, dt) = if self.near { (step.near_per_far(), step.near) } else { (1, step.far) };
             for _ in 0..count {
                 if let Some(watch) = watch.as_deref_mut() {
@@ -229,13 +240,24 @@ impl World {
     /// One physics step of `dt` (s).
     fn step(&mut self, command: &JointCommand, dt: f64) -> Result<(), SimError> {
         let joints = &self.robot.joints;
-        let mut torque_sum = 0.0;
+        let (mut torque_sum, mut load) = (0.0, 0.0);
         for (i, joint) in joints.iter().enumerate() {
             let (q, v) = (self.data.qpos()[7 + i], self.data.qvel()[6 + i]);
-            let wanted = drive_torque(joint, command.positions[i], command.velocities[i], command.torques[i], q, v);
             // 1 / D of M = L^T D L: the joint's inertia with the links below it free and those above it held.
-            let [least, greatest] = torque_range_over_step(joint, v, dt * self.data.q_ldiag_inv()[6 + i]);
-            let torque = wanted.clamp(least, greatest);
+            let inverse_inertia = self.data.q_ldiag_inv()[6 + i];
+            let torque = match &mut self.drives {
+                Some(drives) => {
+                    let now = Measured { position: q, velocity: v, voltage: 1.0, step: dt, inverse_inertia };
+                    drives.torque(i, joint, now)
+                }
+                None => {
+                    let target = (command.positions[i], command.velocities[i], command.torques[i]);
+                    let wanted = drive_torque(joint, target.0, target.1, target.2, q, v);
+                    let [least, greatest] = torque_range_over_step(joint, v, dt * inverse_inertia, 1.0);
+                    wanted.clamp(least, greatest)
+                }
+            };
+            load += torque.abs();
             torque_sum += torque;
             self.work += 0.5 * dt * torque * v;
             self.data.qfrc_applied_mut()[6 + i] = torque;
@@ -246,6 +268,9 @@ impl World {
             if v.abs() > peak.speed {
                 (peak.speed, peak.speed_time) = (v.abs(), self.time);
             }
+        }
+        if let Some(drives) = &mut self.drives {
+            drives.loaded(load);
         }
         if !torque_sum.is_finite() {
             return Err(SimError::Diverged { time: self.time, what: "a joint torque" });
@@ -411,6 +436,7 @@ impl World {
     pub fn snapshot(&self) -> Snapshot {
         Snapshot {
             state: self.data.state(MjtState::mjSTATE_INTEGRATION as u32).into_vec(),
+            drives: self.drives.clone(),
             time: self.time,
             work: self.work,
         }
@@ -425,6 +451,7 @@ impl World {
             .set_state(&snapshot.state, MjtState::mjSTATE_INTEGRATION as u32)
             .map_err(|e| SimError::State { found: e.to_string(), expected: "a snapshot of this world".into() })?;
         self.data.forward();
+        self.drives.clone_from(&snapshot.drives);
         self.time = snapshot.time;
         self.work = snapshot.work;
         Ok(())

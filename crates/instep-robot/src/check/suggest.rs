@@ -59,6 +59,7 @@ pub(crate) fn suggest(outline: &Outline, markup: &Markup, limbs: &Limbs, model: 
         name,
         model: model.file_name().map_or_else(|| UNKNOWN.into(), |file| file.to_string_lossy().into_owned()),
         base: BaseFile { link: known(outline.base.map_or("", |base| outline.link_name(base))), imu: [0.0; 3] },
+        drives: crate::drive::DriveSettings::default(),
         group,
         stand,
         landmark: landmarks(outline, limbs, sides.as_ref(), &contact),
@@ -216,6 +217,11 @@ fn groups(
                 corner: 0.5,
                 kp: round((3.0 * torque).min(share * inertia / (step * step))),
                 kd: round((0.06 * torque).min(share * inertia / step)),
+                pid: None,
+                dead_zone: 0.0,
+                play: 0.0,
+                static_friction: 0.0,
+                viscous_friction: 0.0,
             }
         })
         .collect();

@@ -3,6 +3,7 @@
 
 use instep_robot::Joint;
 use instep_robot::control::{JointCommand, drive_torque, torque_range};
+use instep_robot::drive::Pid;
 use proptest::prelude::*;
 
 fn joint() -> impl Strategy<Value = Joint> {
@@ -16,6 +17,11 @@ fn joint() -> impl Strategy<Value = Joint> {
             corner,
             kp,
             kd,
+            pid: Pid::default(),
+            dead_zone: 0.0,
+            play: 0.0,
+            static_friction: 0.0,
+            viscous_friction: 0.0,
         },
     )
 }
@@ -76,6 +82,11 @@ fn half_way_down_the_slope_there_is_half_the_torque() {
         corner: 0.8,
         kp: 1.0,
         kd: 1.0,
+        pid: Pid::default(),
+        dead_zone: 0.0,
+        play: 0.0,
+        static_friction: 0.0,
+        viscous_friction: 0.0,
     };
     let [least, greatest] = torque_range(&joint, 9.0);
     assert!((greatest - 100.0).abs() < 1e-9);

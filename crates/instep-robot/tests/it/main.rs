@@ -10,6 +10,7 @@
 mod check;
 mod control;
 mod differences;
+mod drive;
 mod fuzz;
 mod geometry;
 mod nao;

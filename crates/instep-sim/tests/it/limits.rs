@@ -1,7 +1,7 @@
 //! Torque and speed limits live in the world, whatever a controller asks for.
 
 use instep_robot::control::{Controller, JointCommand, Sensors};
-use instep_sim::settings::{Step, WorldSettings};
+use instep_sim::settings::{Fidelity, Step, WorldSettings};
 use instep_sim::trial::{TrialSettings, run};
 use instep_sim::{BallState, World};
 
@@ -76,4 +76,37 @@ fn a_standing_robot_stands_and_its_weight_is_on_its_soles() {
         assert!(world.q()[2] > 0.9 * robot.stand[2], "{name} has fallen to {} m", world.q()[2]);
         assert!((mean / (9.81 * robot.mass()) - 1.0).abs() < 0.01, "{name} carries {mean} N");
     }
+}
+
+/// What the world lets through of a feed-forward torque on an elbow of a robot that falls freely, N m, and when, s.
+fn nudged(name: &str, drives: Fidelity) -> Option<(f64, f64)> {
+    let robot = robot(name);
+    let mut q = robot.stand.clone();
+    q[2] += 2.0;
+    let joint = robot.joints.iter().position(|joint| joint.name.contains("lbow")).unwrap();
+    let mut world = World::new(robot.clone(), &WorldSettings { drives, ..WorldSettings::default() }).unwrap();
+    world.reset(&q, &vec![0.0; robot.nv()], &BallState::at_rest([5.0, 0.0, 0.11])).unwrap();
+    let mut command = JointCommand::zeros(robot.joints.len());
+    command.positions.copy_from_slice(&q[7..]);
+    for step in 0..30 {
+        // The first command counts as long under way; this one is new.
+        command.torques[joint] = if step == 0 { 0.0 } else { 0.5 };
+        let time = world.time();
+        world.advance(&command, None).unwrap();
+        if world.torques()[joint] > 0.25 {
+            return Some((world.torques()[joint], time));
+        }
+    }
+    None
+}
+
+#[test]
+fn feed_forward_reaches_a_torque_drive_late_and_a_position_servo_never() {
+    let (_, ideal) = nudged("prestoe", Fidelity::Ideal).unwrap();
+    let (torque, late) = nudged("prestoe", Fidelity::AsBuilt).unwrap();
+    assert!((0.25..0.6).contains(&torque), "{torque} N m");
+    // One far step, then a delay of 1 ms in steps of 2 ms, and the play.
+    assert!((ideal - 0.002).abs() < 1e-9 && (0.004..=0.012).contains(&late), "{ideal} {late}");
+    assert_eq!(nudged("nao", Fidelity::AsBuilt), None);
+    assert_eq!(nudged("wolfgang", Fidelity::AsBuilt), None);
 }
