@@ -49,6 +49,9 @@ pub enum BenchError {
     /// The engine refused.
     #[error(transparent)]
     Kick(#[from] instep_kick::KickError),
+    /// The robot cannot walk.
+    #[error(transparent)]
+    Walk(#[from] instep_walk::WalkError),
     /// The robot refused.
     #[error(transparent)]
     Robot(#[from] instep_robot::RobotError),

@@ -4,6 +4,7 @@
 //! - [`engines`]: which engines there are, and what a robot brings to its trials.
 //! - [`cell`]: one engine, robot, scenario and seed, run and measured.
 //! - [`reach`]: the reachability grid of the adaptive kick, measured in the world.
+//! - [`walking`]: one walk, run and measured.
 //! - [`run`]: all cells on all cores, with a file to resume from.
 //! - [`directions`]: how far the ball goes off the asked direction, and whether the engine knew.
 //! - [`table`] and [`page`]: Markdown, CSV, JSON and HTML.
@@ -21,6 +22,7 @@ pub mod reach;
 pub mod run;
 pub mod scenario;
 pub mod table;
+pub mod walking;
 
 pub use engines::{LEADING, Subject, engines};
 pub use error::BenchError;

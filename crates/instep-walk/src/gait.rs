@@ -107,6 +107,8 @@ pub struct Gait {
     /// When the present mode or step began, s.
     since: f64,
     last_time: f64,
+    /// Since the tick before, s.
+    period: f64,
     heading: f64,
     height: f64,
     asked: Velocity,
@@ -163,6 +165,7 @@ impl Gait {
             mode: Mode::Stand,
             since: 0.0,
             last_time: 0.0,
+            period: 0.0,
             heading: 0.0,
             asked: Velocity::default(),
             velocity: Velocity::default(),
@@ -223,10 +226,18 @@ impl Gait {
         self.waypoint = Some(waypoint);
     }
 
-    /// One tick: reads `state`, writes `command`.
+    /// One tick: reads `state`, writes `command`. The three stages can be called one by one, to time them.
     pub fn tick(&mut self, state: &StateEstimate, command: &mut JointCommand) {
+        let targets = self.plan(state);
+        let outcome = self.solve(&targets);
+        self.write(state, outcome, command);
+    }
+
+    /// First stage: what is wanted in this tick.
+    pub fn plan(&mut self, state: &StateEstimate) -> Targets {
         self.data.set_state(&state.q, &state.v);
         let period = if self.started { (state.time - self.last_time).max(0.0) } else { 0.0 };
+        self.period = period;
         self.last_time = state.time;
         self.footstep = None;
         self.look(state);
@@ -246,13 +257,16 @@ impl Gait {
         self.view.heading = self.heading;
         let lowest = self.height - HEIGHT_RATE * self.settings.gait.height * period;
         self.height = self.settings.gait.height.max(lowest);
-        let targets = match self.mode {
+        match self.mode {
             Mode::Stand => self.stand(None),
             Mode::Shift { support } => self.stand(Some(support)),
             Mode::Step { support } => self.step(support, state.time),
-        };
-        let outcome = self.body.solve(&mut self.data, &targets);
-        self.command(state, period, outcome, command);
+        }
+    }
+
+    /// Second stage: accelerations, forces and torques for `targets`.
+    pub fn solve(&mut self, targets: &Targets) -> Outcome {
+        self.body.solve(&mut self.data, targets)
     }
 
     /// Positions and momentum of this tick.
@@ -459,8 +473,9 @@ impl Gait {
         }
     }
 
-    /// Torques, with a joint reference that is integrated from the accelerations and leaks to what is measured.
-    fn command(&mut self, state: &StateEstimate, period: f64, outcome: Outcome, command: &mut JointCommand) {
+    /// Last stage: torques, with a joint reference that is integrated from the accelerations and leaks to what is measured.
+    pub fn write(&mut self, state: &StateEstimate, outcome: Outcome, command: &mut JointCommand) {
+        let period = self.period;
         match outcome {
             Outcome::Solved => {}
             Outcome::Relaxed => self.counts.relaxed += 1,

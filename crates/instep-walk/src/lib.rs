@@ -1,5 +1,6 @@
 //! Walking of legged robots (paper 4, sections III and IV-F): from senses to joint commands.
 //!
+//! - [`Walker`]: the whole, as a [`instep_robot::control::Controller`].
 //! - [`StateEstimate`]: what walking knows of its robot, the seam between estimator and controller.
 //! - [`gait`]: stands, starts, steps, stops; [`footsteps`] chooses where to, [`swing`] how, [`whole_body`] with which torques,
 //!   by the quadratic program of [`qp`].
@@ -7,16 +8,20 @@
 //!
 //! Maths only: no simulator, no clock, no camera, no field. A tick allocates nothing.
 
+pub mod approach;
 mod error;
 pub mod footsteps;
 pub mod gait;
+pub mod odometry;
 pub mod qp;
 pub mod settings;
 mod state;
 pub mod swing;
+mod walker;
 pub mod whole_body;
 
 pub use error::WalkError;
 pub use gait::Gait;
 pub use settings::{Velocity, WalkSettings};
 pub use state::StateEstimate;
+pub use walker::Walker;

@@ -513,11 +513,8 @@ mod tests {
     fn breach(qp: &Qp, solver: &QpSolver) -> f64 {
         let n = qp.len();
         let mut gradient = qp.gradient.clone();
-        for i in 0..n {
-            for k in 0..n {
-                let (a, b) = (i.max(k), i.min(k));
-                gradient[i] += qp.hessian[a * n + b] * solver.x[k];
-            }
+        for (i, entry) in gradient.iter_mut().enumerate() {
+            *entry += (0..n).map(|k| qp.hessian[i.max(k) * n + i.min(k)] * solver.x[k]).sum::<f64>();
         }
         let mut worst: f64 = 0.0;
         for (row, multiplier) in solver.multipliers() {

@@ -64,6 +64,12 @@ impl From<RobotError> for Failure {
     }
 }
 
+impl From<instep_walk::WalkError> for Failure {
+    fn from(error: instep_walk::WalkError) -> Self {
+        Self::input(error)
+    }
+}
+
 impl From<KickError> for Failure {
     fn from(error: KickError) -> Self {
         Self::input(error)

@@ -22,6 +22,7 @@ mod robot;
 mod ros;
 mod train;
 mod tune;
+mod walk;
 
 use std::process::ExitCode;
 
@@ -61,6 +62,8 @@ enum Command {
     Train(train::Train),
     /// Find an engine's settings for a robot by CMA-ES
     Tune(tune::Tune),
+    /// Let a robot walk on its senses, at a velocity or to a place, and measure how it goes
+    Walk(walk::Walk),
 }
 
 fn main() -> ExitCode {
@@ -77,6 +80,7 @@ fn main() -> ExitCode {
         Command::Ros(ros) => ros.run(&output),
         Command::Train(train) => train.run(&output),
         Command::Tune(tune) => tune.run(&output),
+        Command::Walk(walk) => walk.run(&output),
     };
     match done {
         Ok(code) => code,

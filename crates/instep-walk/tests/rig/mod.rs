@@ -10,6 +10,7 @@ use instep_robot::control::JointCommand;
 use instep_sim::settings::WorldSettings;
 use instep_sim::trial::has_fallen;
 use instep_sim::{BallState, World};
+use instep_walk::odometry::Odometry;
 use instep_walk::{Gait, StateEstimate, Velocity, WalkSettings};
 use nalgebra::Vector3;
 

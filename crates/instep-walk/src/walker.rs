@@ -1,0 +1,96 @@
+//! A walking robot: senses in, joint commands out. What navigation, behaviour and a match steer.
+
+use std::sync::Arc;
+
+use instep_robot::Robot;
+use instep_robot::control::{Controller, JointCommand, Sensors};
+
+use crate::odometry::Odometry;
+use crate::whole_body::{Outcome, Targets};
+use crate::{Gait, StateEstimate, Velocity, WalkError, WalkSettings};
+
+/// The gait with its estimator.
+#[derive(Debug)]
+pub struct Walker {
+    gait: Gait,
+    odometry: Odometry,
+    state: StateEstimate,
+}
+
+impl Walker {
+    /// For `robot` with the settings of its folder; stands until it is told a velocity.
+    ///
+    /// # Errors
+    /// When the robot has not what walking needs, or its `walk.toml` is not what it should be.
+    pub fn load(robot: Arc<Robot>) -> Result<Self, WalkError> {
+        let settings = WalkSettings::load(&robot)?;
+        Self::new(robot, settings)
+    }
+
+    /// For `robot` with `settings`.
+    ///
+    /// # Errors
+    /// When the robot has not what walking needs.
+    pub fn new(robot: Arc<Robot>, settings: WalkSettings) -> Result<Self, WalkError> {
+        Ok(Self {
+            state: StateEstimate::standing(&robot),
+            odometry: Odometry::new(Arc::clone(&robot)),
+            gait: Gait::new(robot, settings)?,
+        })
+    }
+
+    /// Asks for a velocity from now on; returns what the robot is allowed. Zero is a stop, then a stand.
+    pub fn set_velocity(&mut self, velocity: Velocity) -> Velocity {
+        self.gait.set_velocity(velocity)
+    }
+
+    /// Where the base is over the ground, in the frame of its start: x, y (m) and heading (rad).
+    #[must_use]
+    pub fn odometry(&self) -> [f64; 3] {
+        let [w, x, y, z] = [self.state.q[3], self.state.q[4], self.state.q[5], self.state.q[6]];
+        let heading = (2.0 * (w * z + x * y)).atan2(1.0 - 2.0 * (y * y + z * z));
+        [self.state.q[0], self.state.q[1], heading]
+    }
+
+    /// The last estimate.
+    #[must_use]
+    pub fn estimate(&self) -> &StateEstimate {
+        &self.state
+    }
+
+    /// The gait.
+    #[must_use]
+    pub fn gait(&self) -> &Gait {
+        &self.gait
+    }
+
+    /// First stage of a tick: estimates the state and says what is wanted. The stages are there to be timed one by one;
+    /// [`Controller::tick`] calls all three.
+    pub fn plan(&mut self, sensors: &Sensors) -> Targets {
+        self.odometry.update(sensors, &mut self.state);
+        self.gait.plan(&self.state)
+    }
+
+    /// Second stage: the whole-body controller.
+    pub fn solve(&mut self, targets: &Targets) -> Outcome {
+        self.gait.solve(targets)
+    }
+
+    /// Last stage: the command.
+    pub fn write(&mut self, outcome: Outcome, command: &mut JointCommand) {
+        self.gait.write(&self.state, outcome, command);
+    }
+
+    /// The gait, to lead a swing foot.
+    pub fn gait_mut(&mut self) -> &mut Gait {
+        &mut self.gait
+    }
+}
+
+impl Controller for Walker {
+    fn tick(&mut self, sensors: &Sensors, command: &mut JointCommand) {
+        let targets = self.plan(sensors);
+        let outcome = self.solve(&targets);
+        self.write(outcome, command);
+    }
+}
