@@ -132,7 +132,8 @@ pub fn walk(
     mut tell: impl FnMut(f64),
 ) -> Result<Walked, BenchError> {
     let mut world_settings = task.world;
-    world_settings.step.far = world_settings.step.far.min(PERIOD);
+    world_settings.step.tick = world_settings.step.tick.min(PERIOD);
+    world_settings.step.far = world_settings.step.far.min(world_settings.step.tick);
     let mut world = World::new(Arc::clone(robot), &world_settings)?;
     let far_ball = BallState::at_rest([1000.0, 0.0, world_settings.ball.radius]);
     world.reset(&robot.stand, &vec![0.0; robot.nv()], &far_ball)?;
@@ -143,7 +144,7 @@ pub fn walk(
     let mut sensors = Sensors::default();
     let mut command = JointCommand::zeros(robot.joints.len());
     let mut meter = Meter::new(robot, task);
-    let period = world_settings.step.far;
+    let period = world_settings.step.tick;
     let steps = ((task.duration + AFTER) / period).round() as usize;
     for step in 0..steps {
         let time = step as f64 * period;
@@ -315,7 +316,7 @@ impl Meter {
                 .then_some((self.moving - self.task.duration).max(0.0)),
             goal_error,
             tick_p99: [p99(&mut self.solves), p99(&mut self.ticks)],
-            real_time_factor: count as f64 * world.settings().step.far / sum,
+            real_time_factor: count as f64 * world.settings().step.tick / sum,
             counts: walker.gait().counts(),
             peaks: peaks.map(|(joint, peak)| [peak.torque / joint.torque, peak.speed / joint.speed]).collect(),
             footsteps: self.footsteps,

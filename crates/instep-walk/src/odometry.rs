@@ -92,13 +92,13 @@ impl Odometry {
         let velocity = self.velocity - lever;
         self.position += velocity * period;
         let (mut error, mut loads) = (Vector3::zeros(), 0.0);
-        for i in 0..2 {
+        for (i, (anchor, from_base)) in self.anchors.iter_mut().zip(from_base).enumerate() {
             if !state.contact[i] {
-                self.anchors[i] = None;
+                *anchor = None;
                 continue;
             }
-            let anchor = *self.anchors[i].get_or_insert(self.position + from_base[i]);
-            error += (anchor - from_base[i] - self.position) * state.load[i];
+            let anchor = *anchor.get_or_insert(self.position + from_base);
+            error += (anchor - from_base - self.position) * state.load[i];
             loads += state.load[i];
         }
         if loads > 0.0 {

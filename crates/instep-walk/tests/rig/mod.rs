@@ -10,7 +10,6 @@ use instep_robot::control::JointCommand;
 use instep_sim::settings::WorldSettings;
 use instep_sim::trial::has_fallen;
 use instep_sim::{BallState, World};
-use instep_walk::odometry::Odometry;
 use instep_walk::{Gait, StateEstimate, Velocity, WalkSettings};
 use nalgebra::Vector3;
 
@@ -23,7 +22,7 @@ pub(crate) fn robot(name: &str) -> Arc<Robot> {
 /// A world at 1 kHz.
 pub(crate) fn world(robot: &Arc<Robot>) -> World {
     let mut settings = WorldSettings::default();
-    settings.step.far = 0.001;
+    settings.step.tick = 0.001;
     let mut world = World::new(Arc::clone(robot), &settings).unwrap();
     let (q, v) = (robot.stand.clone(), vec![0.0; robot.nv()]);
     world.reset(&q, &v, &BallState::at_rest([50.0, 0.0, 0.11])).unwrap();
