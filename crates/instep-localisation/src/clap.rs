@@ -16,7 +16,7 @@ use crate::window::{Window, nearest_first};
 use crate::{Frame, Settings};
 
 /// Hypotheses this near to the prediction are averaged, m and rad.
-const RADIUS: f64 = 1.0;
+const RADIUS: f64 = 0.7;
 const ANGLE: f64 = 0.5;
 /// The pose is reset when the centroid is farther than this, m and rad.
 const RESET_DISTANCE: f64 = 1.0;

@@ -6,9 +6,9 @@
 use instep_field::{Pose, wrap};
 use nalgebra::Vector3;
 
-use crate::LocalisationError;
 use crate::localiser::{Localiser, Method, Status};
 use crate::stream::{Stream, Told};
+use crate::{Candidate, LocalisationError};
 
 /// A pose is right within this, m and rad.
 const RIGHT: [f64; 2] = [0.5, 0.26];
@@ -66,6 +66,8 @@ pub struct Track {
     pub update_times: Vec<f64>,
     /// What each check cost, s.
     pub check_times: Vec<f64>,
+    /// What each check found, with its time, s.
+    pub candidates: Vec<(f64, Vec<Candidate>)>,
     /// When the robot was carried away; otherwise the recovery counts from the start, s.
     pub carried_at: Option<f64>,
 }
@@ -92,6 +94,7 @@ pub fn follow(method: Box<dyn Method>, stream: &Stream, clock: &dyn Fn() -> f64)
                 let begin = clock();
                 if localiser.check_if_due() {
                     track.check_times.push(clock() - begin);
+                    track.candidates.push((frame.time, localiser.method().candidates().to_vec()));
                 }
                 if localiser.method().resets() > resets {
                     track.resets += 1;

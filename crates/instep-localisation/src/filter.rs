@@ -87,11 +87,6 @@ impl LandmarkFilter {
         }
     }
 
-    /// What the last frames speak for, best first: for reports.
-    pub fn candidates(&mut self) -> &[Candidate] {
-        self.window.candidates(&self.map)
-    }
-
     /// Estimated scale of ranges, scale of odometry ahead and sideways (each 1 when exact), gyro bias, rad/s.
     pub fn calibration(&self) -> [f64; 4] {
         let x = &self.state;
@@ -386,5 +381,9 @@ impl Method for LandmarkFilter {
 
     fn resets(&self) -> usize {
         self.resets
+    }
+
+    fn candidates(&self) -> &[Candidate] {
+        self.window.last_candidates()
     }
 }

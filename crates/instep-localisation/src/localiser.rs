@@ -8,7 +8,7 @@ use std::collections::VecDeque;
 use instep_field::Pose;
 use nalgebra::Matrix3;
 
-use crate::{Frame, LocalisationError, Step};
+use crate::{Candidate, Frame, LocalisationError, Step};
 
 /// What is known at the start, from what really happened in the game.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -82,6 +82,11 @@ pub trait Method {
     fn resets(&self) -> usize {
         0
     }
+
+    /// What the last check found, best first: for reports.
+    fn candidates(&self) -> &[Candidate] {
+        &[]
+    }
 }
 
 impl Method for Box<dyn Method> {
@@ -114,6 +119,9 @@ impl Method for Box<dyn Method> {
     }
     fn resets(&self) -> usize {
         (**self).resets()
+    }
+    fn candidates(&self) -> &[Candidate] {
+        (**self).candidates()
     }
 }
 

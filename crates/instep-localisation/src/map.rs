@@ -85,6 +85,13 @@ impl Map {
         self.begins[class]..self.begins[class + 1]
     }
 
+    /// The landmark of a class that is nearest to a point of the field.
+    pub(crate) fn nearest(&self, class: LandmarkClass, point: [f64; 2]) -> Option<[f64; 2]> {
+        let square = |p: [f64; 2]| (p[0] - point[0]).powi(2) + (p[1] - point[1]).powi(2);
+        let of_class = self.landmarks.get(self.of_class(class)).unwrap_or_default();
+        of_class.iter().map(|l| l.1).min_by(|a, b| square(*a).total_cmp(&square(*b)))
+    }
+
     /// Ordered pairs of these classes whose distance is within `tolerance` of `distance`.
     pub(crate) fn pairs(&self, a: LandmarkClass, b: LandmarkClass, distance: f64, tolerance: f64) -> &[Pair] {
         let list = &self.pairs[self.class(a) as usize * CLASSES + self.class(b) as usize];

@@ -126,12 +126,12 @@ impl Method for MonteCarlo {
         let mut sum = 0.0;
         for (particle, weight) in self.particles.iter().zip(&mut self.weights) {
             for sight in &self.sights {
-                let square = self.map.of_class(sight.class).map(|k| {
-                    let expected = Expected::of(particle, self.map.landmarks()[k].1);
+                let at = particle.outer_from_local(sight.point(1.0));
+                let square = self.map.nearest(sight.class, at).map_or(f64::INFINITY, |landmark| {
+                    let expected = Expected::of(particle, landmark);
                     ((sight.range - expected.range) / sight.range_sigma).powi(2)
                         + (wrap(sight.bearing - expected.bearing) / sight.bearing_sigma).powi(2)
                 });
-                let square = square.fold(f64::INFINITY, f64::min);
                 *weight *= (FALSE_SHARE + (-0.5 * square).exp()).powf(TEMPER);
             }
             sum += *weight;

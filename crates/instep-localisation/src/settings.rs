@@ -156,7 +156,7 @@ pub struct HypothesisSettings {
 
 impl Default for HypothesisSettings {
     fn default() -> Self {
-        HypothesisSettings { least_base: 0.7, tolerance: 0.05, sigmas: 2.0, margin: 1.0, most_sights: 8, most: 160 }
+        HypothesisSettings { least_base: 0.7, tolerance: 0.05, sigmas: 2.0, margin: 1.0, most_sights: 8, most: 96 }
     }
 }
 

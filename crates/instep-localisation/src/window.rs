@@ -120,6 +120,11 @@ impl Window {
         &self.candidates
     }
 
+    /// What [`Window::candidates`] found the last time.
+    pub(crate) fn last_candidates(&self) -> &[Candidate] {
+        &self.candidates
+    }
+
     /// Share of the window's sights that a robot at `pose` now explains.
     pub(crate) fn share(&self, map: &Map, pose: &Pose) -> f64 {
         let filter = &self.settings.filter;
@@ -135,12 +140,8 @@ impl Window {
 
 /// How well a sight fits its nearest landmark of its class from `pose`: 1 exactly, 0 outside the gate.
 fn fit(map: &Map, sight: &Polar, pose: &Pose, gate: f64, corner: f64) -> f64 {
-    // The landmark nearest to where the sight would lie on the field: one comparison of squares for each.
     let at = pose.outer_from_local(sight.point(1.0));
-    let square = |p: [f64; 2]| (p[0] - at[0]).powi(2) + (p[1] - at[1]).powi(2);
-    let nearest =
-        map.of_class(sight.class).map(|k| map.landmarks()[k].1).min_by(|a, b| square(*a).total_cmp(&square(*b)));
-    let Some(landmark) = nearest else { return 0.0 };
+    let Some(landmark) = map.nearest(sight.class, at) else { return 0.0 };
     let expected = Expected::of(pose, landmark);
     let dr = (sight.range - expected.range) / sight.range_sigma;
     let db = wrap(sight.bearing - expected.bearing) / sight.bearing_sigma;

@@ -6,6 +6,7 @@ use std::fmt::Display;
 use std::process::ExitCode;
 
 use instep_kick::KickError;
+use instep_localisation::LocalisationError;
 use instep_motion::MotionError;
 use instep_report::ReportError;
 use instep_retarget::RetargetError;
@@ -72,6 +73,12 @@ impl From<instep_walk::WalkError> for Failure {
 
 impl From<KickError> for Failure {
     fn from(error: KickError) -> Self {
+        Self::input(error)
+    }
+}
+
+impl From<LocalisationError> for Failure {
+    fn from(error: LocalisationError) -> Self {
         Self::input(error)
     }
 }

@@ -13,6 +13,7 @@ mod files;
 mod interrupt;
 mod kick;
 mod learn_table;
+mod locate;
 mod mujoco_log;
 mod output;
 mod places;
@@ -51,6 +52,8 @@ enum Command {
     Kick(kick::Kick),
     /// Compare three kinds of reference, with and without early termination (paper 1, Table II)
     LearnTable(learn_table::LearnTable),
+    /// Follow a robot's pose on the field by CLAP, the shipped landmark filter and what others use, on the same data
+    Locate(locate::Locate),
     /// Turn a human kick (ASF/AMC or BVH) into a reference for a robot
     Retarget(retarget::Retarget),
     /// Look at a robot's own files
@@ -75,6 +78,7 @@ fn main() -> ExitCode {
         Command::Eval(eval) => eval.run(&output),
         Command::Kick(kick) => kick.run(&output),
         Command::LearnTable(table) => table.run(&output),
+        Command::Locate(locate) => locate.run(&output),
         Command::Retarget(retarget) => retarget.run(&output),
         Command::Robot(command) => command.run(&output),
         Command::Ros(ros) => ros.run(&output),
