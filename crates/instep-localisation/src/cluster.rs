@@ -96,8 +96,8 @@ impl Clustering {
             if round + 1 == settings.rounds {
                 break;
             }
-            for k in 0..clusters.len() {
-                let center = clusters[k].pose;
+            for (k, cluster) in clusters.iter().enumerate() {
+                let center = cluster.pose;
                 distances.clear();
                 distances.extend(kept.iter().filter(|(_, o)| *o == k).map(|(p, _)| squared(p, &center)));
                 if distances.is_empty() {

@@ -24,6 +24,8 @@ pub struct Sample {
     pub estimate: Pose,
     /// The method said that it has no pose.
     pub lost: bool,
+    /// The method said that the twin is as likely.
+    pub ambiguous: bool,
     /// Normalised squared error of (x, y, heading), where a covariance is known; 3 on average when it is honest.
     pub nees: Option<f64>,
 }
@@ -123,8 +125,15 @@ impl Track {
             );
             p.try_inverse().map(|inverse| e.dot(&(inverse * e)))
         });
-        let lost = localiser.status() == Status::Lost;
-        self.samples.push(Sample { time: truth.time, truth: truth.pose, estimate, lost, nees });
+        let status = localiser.status();
+        self.samples.push(Sample {
+            time: truth.time,
+            truth: truth.pose,
+            estimate,
+            lost: status == Status::Lost,
+            ambiguous: matches!(status, Status::Ambiguous { .. }),
+            nees,
+        });
     }
 
     /// From the event (or the start) until the estimate is right and stays so, s; nothing when it never is.
@@ -233,7 +242,7 @@ mod tests {
     use super::*;
 
     fn sample(time: f64, truth: Pose, estimate: Pose) -> Sample {
-        Sample { time, truth, estimate, lost: false, nees: None }
+        Sample { time, truth, estimate, lost: false, ambiguous: false, nees: None }
     }
 
     #[test]

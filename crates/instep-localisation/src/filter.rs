@@ -216,8 +216,8 @@ impl LandmarkFilter {
             ]);
             let range = vx.hypot(vy);
             let along = (normal[0] * turned[0] + normal[1] * turned[1]) / range;
-            let variance =
-                (noise.range_sigma(range) * along).powi(2) + (range * noise.bearing).powi(2) * (1.0 - along * along);
+            let variance = (noise.range_sigma(range) * along).powi(2)
+                + (range * noise.bearing_sigma(range)).powi(2) * (1.0 - along * along);
             let pose_variance = slope.dot(&(self.covariance * slope));
             if residual * residual > 9.0 * (variance + pose_variance) {
                 return;
@@ -385,5 +385,167 @@ impl Method for LandmarkFilter {
 
     fn candidates(&self) -> &[Candidate] {
         self.window.last_candidates()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use instep_field::{Field, Landmark, LandmarkClass};
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    use super::*;
+    use crate::Sight;
+
+    fn map() -> Arc<Map> {
+        Arc::new(Map::new(&Field::named("adult-2024").unwrap(), true).unwrap())
+    }
+
+    fn normal(rng: &mut ChaCha8Rng) -> f64 {
+        StandardNormal.sample(rng)
+    }
+
+    /// All landmarks from 0.85 to 8 m, with the noise that the settings expect.
+    fn sights(map: &Map, settings: &Settings, pose: &Pose, rng: &mut ChaCha8Rng) -> Vec<Sight> {
+        let near = map.landmarks().iter().filter_map(|&(class, at)| {
+            let [x, y] = pose.local_from_outer(at);
+            let range = x.hypot(y);
+            (0.85..8.0).contains(&range).then_some((class, range, y.atan2(x)))
+        });
+        let mut noisy = |(class, range, bearing): (LandmarkClass, f64, f64)| {
+            let range: f64 = range + settings.noise.range_sigma(range) * normal(rng);
+            let (s, c) = (bearing + settings.noise.bearing_sigma(range) * normal(rng)).sin_cos();
+            Sight { class, position: [range * c, range * s], confidence: 1.0, covariance: None }
+        };
+        near.map(&mut noisy).collect()
+    }
+
+    /// The cost that the update should have made least: prior and Cauchy's loss of every associated sight.
+    fn cost(filter: &LandmarkFilter, prior: &State, information: &Covariance, x: &State) -> f64 {
+        let settings = &filter.settings.filter;
+        let offset = difference(x, prior);
+        let mut sum = 0.5 * offset.dot(&(information * offset));
+        for (sight, landmark) in filter.sights.iter().zip(&filter.association.landmark) {
+            let Some(landmark) = *landmark else { continue };
+            let [dx, dy] = [filter.map.landmarks()[landmark].1[0] - x[0], filter.map.landmarks()[landmark].1[1] - x[1]];
+            let range = (sight.range - (1.0 + x[RANGE_SCALE]) * dx.hypot(dy)) / sight.range_sigma;
+            let bearing = wrap(sight.bearing - dy.atan2(dx) + x[2]) / sight.bearing_sigma;
+            let square = range * range + bearing * bearing;
+            let c = settings.cauchy * settings.cauchy;
+            sum += 0.5 * c * (1.0 + square / c).ln() / settings.information_divisor;
+        }
+        sum
+    }
+
+    /// An oracle that knows no slopes: at the result the cost's central differences vanish.
+    #[test]
+    fn the_update_finds_the_least_cost() {
+        let map = map();
+        let mut settings = Settings::default();
+        settings.filter.associations = 1;
+        settings.filter.iterations = 60;
+        let mut rng = ChaCha8Rng::seed_from_u64(4);
+        for k in 0..20 {
+            let truth = Pose::new(0.3 * f64::from(k) - 3.0, 0.2 * f64::from(k) - 2.0, 0.31 * f64::from(k));
+            let mut filter = LandmarkFilter::new(map.clone(), settings);
+            let near = Pose::new(truth.x + 0.1 * normal(&mut rng), truth.y, truth.heading + 0.03 * normal(&mut rng));
+            filter.start(Start::Near { pose: near, position_sigma: 0.15, heading_sigma: 0.05 });
+            let (prior, information) = (filter.state, filter.covariance.try_inverse().unwrap());
+            let landmarks = sights(&map, &settings, &truth, &mut rng);
+            filter.update(&Frame { time: 0.0, landmarks, lines: Vec::new() });
+            assert!(filter.association.landmark.iter().flatten().count() > 3);
+            for i in 0..N {
+                let mut step = State::zeros();
+                step[i] = 1e-6;
+                let at = |s: f64| cost(&filter, &prior, &information, &(filter.state + s * step));
+                let slope = (at(1.0) - at(-1.0)) / 2e-6;
+                let scale = information[(i, i)].sqrt();
+                assert!(slope.abs() < 1e-3 * scale.max(1.0), "pose {k}, state {i}: slope {slope}");
+            }
+        }
+    }
+
+    /// Where the noise is what the settings say, new in each frame, the squared error over the covariance is 3 on
+    /// average: in the 99 % band of chi-square over 200 runs.
+    #[test]
+    fn the_covariance_is_honest() {
+        // One landmark of each class: no sight can be taken for another's.
+        let places = [(7.0, 1.3), (4.0, -3.0), (0.0, 4.5), (0.0, -1.5), (4.9, 0.0)];
+        let own = LandmarkClass::ALL.iter().zip(places).map(|(&class, (x, y))| Landmark { class, x, y });
+        let field = Field { own_landmarks: Some(own.collect()), ..Field::named("adult-2024").unwrap() };
+        let map = Arc::new(Map::new(&field, false).unwrap());
+        let mut settings = Settings::default();
+        settings.filter.information_divisor = 1.0;
+        settings.filter.cauchy = 1e6;
+        settings.filter.gate = 1e6;
+        let odometry = settings.odometry;
+        let (runs, dt) = (200, 0.05);
+        let mut sum = 0.0;
+        for run in 0..runs {
+            let mut rng = ChaCha8Rng::seed_from_u64(run);
+            let mut truth = Pose::new(1.0, -1.0, 0.4);
+            let start = Pose::new(
+                truth.x + 0.1 * normal(&mut rng),
+                truth.y + 0.1 * normal(&mut rng),
+                truth.heading + 0.05 * normal(&mut rng),
+            );
+            let mut filter = LandmarkFilter::new(map.clone(), settings);
+            filter.start(Start::Near { pose: start, position_sigma: 0.1, heading_sigma: 0.05 });
+            let scale = 1.0 + settings.filter.range_scale * normal(&mut rng);
+            let ahead = 1.0 + odometry.scale_ahead * normal(&mut rng);
+            let sideways = 1.0 + odometry.scale_sideways * normal(&mut rng);
+            let bias = odometry.gyro_bias * normal(&mut rng);
+            for _ in 0..40 {
+                let told = Pose::new(0.02, 0.005, 0.02);
+                let slip = (odometry.slip.powi(2) * dt + (odometry.step_share * 0.02_f64.hypot(0.005)).powi(2)).sqrt();
+                let turn = (odometry.heading.powi(2) * dt + (odometry.turn_share * told.heading).powi(2)).sqrt();
+                truth = truth.then(&Pose::new(
+                    ahead * told.x + slip * normal(&mut rng),
+                    sideways * told.y + slip * normal(&mut rng),
+                    told.heading - bias * dt + turn * normal(&mut rng),
+                ));
+                filter.predict(&told, dt);
+                let mut landmarks = sights(&map, &settings, &truth, &mut rng);
+                for sight in &mut landmarks {
+                    sight.position = sight.position.map(|v| v * scale);
+                }
+                nearest_first(&landmarks, &settings.noise, settings.filter.most_sights, &mut filter.sights);
+                filter.correct(&[]);
+            }
+            let e = nalgebra::Vector3::new(
+                filter.state[0] - truth.x,
+                filter.state[1] - truth.y,
+                wrap(filter.state[2] - truth.heading),
+            );
+            sum += e.dot(&(Method::covariance(&filter).unwrap().try_inverse().unwrap() * e));
+        }
+        let mean = sum / runs as f64;
+        assert!((2.57..3.46).contains(&mean), "NEES {mean}");
+    }
+
+    /// Ends of lines alone, seen without error, pull a wrong pose to the truth.
+    #[test]
+    fn lines_correct_the_pose() {
+        let map = map();
+        let truth = Pose::new(3.0, 1.0, 0.7);
+        let mut filter = LandmarkFilter::new(map.clone(), Settings::default());
+        let near = Pose::new(3.1, 0.93, 0.74);
+        filter.start(Start::Near { pose: near, position_sigma: 0.1, heading_sigma: 0.05 });
+        let seen = |from: [f64; 2], to: [f64; 2]| LineSight {
+            from: truth.local_from_outer(from),
+            to: truth.local_from_outer(to),
+        };
+        let lines = vec![
+            seen([4.0, 2.5], [4.0, -0.5]),
+            seen([4.5, 3.0], [6.5, 3.0]),
+            seen([7.0, 0.5], [7.0, 3.5]),
+            seen([0.0, 1.7], [0.0, 3.5]),
+        ];
+        for _ in 0..10 {
+            filter.update(&Frame { time: 0.0, landmarks: Vec::new(), lines: lines.clone() });
+        }
+        let pose = filter.pose();
+        assert!(pose.distance(&truth) < 0.03 && wrap(pose.heading - truth.heading).abs() < 0.005, "{pose:?}");
     }
 }

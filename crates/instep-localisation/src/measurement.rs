@@ -29,7 +29,7 @@ impl Polar {
                 let across = s * s * xx - 2.0 * c * s * xy + c * c * yy;
                 (along.sqrt(), across.sqrt() / range)
             }
-            None => (noise.range_sigma(range), noise.bearing),
+            None => (noise.range_sigma(range), noise.bearing_sigma(range)),
         };
         Polar { class: sight.class, range, bearing: y.atan2(x), range_sigma, bearing_sigma }
     }

@@ -33,6 +33,8 @@ pub struct Noise {
     pub range_floor: f64,
     /// Bearing error, rad.
     pub bearing: f64,
+    /// Error across the line of sight that is there at any distance, m: close by, a bearing says little.
+    pub across_floor: f64,
 }
 
 impl Default for Noise {
@@ -42,6 +44,7 @@ impl Default for Noise {
             range_shares: [0.01, 0.03, 0.05, 0.08, 0.10],
             range_floor: 0.03,
             bearing: 1.3_f64.to_radians(),
+            across_floor: 0.01,
         }
     }
 }
@@ -56,6 +59,11 @@ impl Noise {
     /// m
     pub(crate) fn range_sigma(&self, range: f64) -> f64 {
         self.range_share(range) * range + self.range_floor
+    }
+
+    /// rad
+    pub(crate) fn bearing_sigma(&self, range: f64) -> f64 {
+        self.bearing.hypot(self.across_floor / range)
     }
 }
 
@@ -156,7 +164,7 @@ pub struct HypothesisSettings {
 
 impl Default for HypothesisSettings {
     fn default() -> Self {
-        HypothesisSettings { least_base: 0.7, tolerance: 0.05, sigmas: 2.0, margin: 1.0, most_sights: 8, most: 96 }
+        HypothesisSettings { least_base: 0.7, tolerance: 0.05, sigmas: 2.0, margin: 1.0, most_sights: 8, most: 80 }
     }
 }
 
@@ -225,6 +233,7 @@ impl Settings {
         let positive = [
             ("noise.range_floor", noise.range_floor),
             ("noise.bearing", noise.bearing),
+            ("noise.across_floor", noise.across_floor),
             ("odometry.slip", odometry.slip),
             ("odometry.heading", odometry.heading),
             ("odometry.scale_time", odometry.scale_time),

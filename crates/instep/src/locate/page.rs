@@ -92,7 +92,8 @@ fn good(is: bool) -> Verdict {
 /// The grass with its lines.
 fn pitch(field: &Field) -> Pitch {
     let f = |p: [f64; 2]| p.map(|v| v as f32);
-    let markings = field.lines().iter().map(|line| match *line {
+    let lines = field.lines();
+    let markings = lines.iter().map(|line| match *line {
         Line::Segment { from, to } => Marking::Line { from: f(from), to: f(to) },
         Line::Circle { center, radius } => Marking::Circle { center: f(center), radius: radius as f32 },
     });
@@ -142,8 +143,10 @@ fn replay(stream: &Stream, groups: &[(&'static str, Vec<Track>)]) -> Replay {
         let poses = kept.iter().map(|&i| track.samples[i].estimate).collect();
         shown.push(Shown { name, color: Color::ORANGE, poses });
     }
-    let mut actors: Vec<Actor> = shown.iter().enumerate().map(|(k, s)| robot(s, 0.02 * k as f32)).collect();
-    if let Some(filter) = actors.get_mut(1) {
+    // The goals come first: the view follows the first actor, and they stay.
+    let mut actors = vec![goals(&stream.field)];
+    actors.extend(shown.iter().enumerate().map(|(k, s)| robot(s, 0.02 * k as f32)));
+    if let Some(filter) = actors.get_mut(2) {
         filter.arrows = sights(stream, &times, start, &shown[1].poses);
     }
     actors.push(clusters(first, &times, start));
@@ -156,11 +159,29 @@ fn replay(stream: &Stream, groups: &[(&'static str, Vec<Track>)]) -> Replay {
         pitch: Some(pitch(&stream.field)),
         camera: Some(Camera {
             target: [0.0, 0.0, 0.0],
-            distance: 1.0 * half,
+            distance: 1.25 * half,
             azimuth: -std::f32::consts::FRAC_PI_2,
             elevation: 1.45,
         }),
     }
+}
+
+/// Both goals: posts and bars.
+fn goals(field: &Field) -> Actor {
+    let radius = field.line_width as f32;
+    let part = |shape, pose| Part { shape, color: Color::SHELL, finish: Finish::Plain, poses: vec![pose] };
+    let mut parts = Vec::new();
+    for goal in [field.own_goal(), field.opponent_goal()] {
+        let height = goal.height as f32;
+        for [x, y] in goal.posts {
+            let shape = Shape::Cylinder { radius, half_length: height / 2.0 };
+            parts.push(part(shape, instep_report::Pose::at([x as f32, y as f32, height / 2.0])));
+        }
+        let half = field.goal.width as f32 / 2.0;
+        let bar = Shape::Box { half_extents: [radius, half, radius] };
+        parts.push(part(bar, instep_report::Pose::at([goal.center[0] as f32, 0.0, height])));
+    }
+    Actor { name: "goals".into(), parts, ..Actor::default() }
 }
 
 /// Where a pose stands in the replay.
