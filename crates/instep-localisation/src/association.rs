@@ -42,9 +42,17 @@ impl Association {
         self.landmark.resize(sights.len(), None);
         self.taken.clear();
         self.taken.resize(map.landmarks().len(), false);
+        let position_variance = covariance[(0, 0)] + covariance[(1, 1)];
         for (i, sight) in sights.iter().enumerate() {
+            // A range alone that is outside the gate spares the rest: most landmarks of a class.
+            let widest = gate * (position_variance + sight.range_sigma * sight.range_sigma);
             for k in map.of_class(sight.class) {
-                let expected = Expected::of(pose, map.landmarks()[k].1);
+                let landmark = map.landmarks()[k].1;
+                let range = (landmark[0] - pose.x).hypot(landmark[1] - pose.y);
+                if (sight.range - scale * range).powi(2) > scale * scale * widest {
+                    continue;
+                }
+                let expected = Expected::of(pose, landmark);
                 let square = squared_distance(sight, &expected, covariance, scale);
                 if square < gate {
                     self.near.push((square, i, k));

@@ -243,7 +243,7 @@ mod tests {
             }
         }
         for _ in 0..800 {
-            poses.push(Pose::new(14.0 * random(), 9.0 * random(), 6.28 * random()));
+            poses.push(Pose::new(14.0 * random(), 9.0 * random(), 6.2 * random()));
         }
         let found = clustering.find(&poses).to_vec();
         for (cluster, heap) in found.iter().zip(&heaps) {

@@ -5,6 +5,7 @@
 use std::fmt::Display;
 use std::process::ExitCode;
 
+use instep_field::FieldError;
 use instep_kick::KickError;
 use instep_localisation::LocalisationError;
 use instep_motion::MotionError;
@@ -73,6 +74,12 @@ impl From<instep_walk::WalkError> for Failure {
 
 impl From<KickError> for Failure {
     fn from(error: KickError) -> Self {
+        Self::input(error)
+    }
+}
+
+impl From<FieldError> for Failure {
+    fn from(error: FieldError) -> Self {
         Self::input(error)
     }
 }

@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use clap::Args;
 use instep_bench::cpu::thread_seconds;
+use instep_field::Field;
 use instep_localisation::evaluate::{Measures, Track, follow};
 use instep_localisation::scenario::{Event, Scenario};
 use instep_localisation::stream::Stream;
@@ -19,6 +20,7 @@ use crate::files;
 use crate::output::{self, Output, Paint};
 
 mod page;
+mod recording;
 
 /// The arguments of `instep locate`.
 #[derive(Debug, Args)]
@@ -27,9 +29,12 @@ pub(crate) struct Locate {
     /// lines, large, carried, start-error, own-half
     #[arg(long, value_name = "NAME", default_value = "star")]
     scenario: String,
-    /// A recording in place of a scenario, as JSON lines (docs/locate.md)
+    /// A recording in place of a scenario: JSON lines, or MCAP by the ending .mcap (docs/locate.md)
     #[arg(long, value_name = "FILE", conflicts_with_all = ["scenario", "seeds", "seed"])]
     recording: Option<PathBuf>,
+    /// The field of the recording: a name, or the path of a TOML file [default: what it says, else adult-2024]
+    #[arg(long, value_name = "FIELD", requires = "recording")]
+    field: Option<String>,
     /// Number of seeds
     #[arg(long, value_name = "K", default_value_t = 3)]
     seeds: u64,
@@ -135,7 +140,12 @@ impl Locate {
     /// The streams, whether something happens in them, and what they are called.
     fn streams(&self) -> Result<(Vec<Stream>, bool, String), Failure> {
         if let Some(file) = &self.recording {
-            return Ok((vec![Stream::load(file)?], false, file.display().to_string()));
+            let is_mcap = file.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap"));
+            let mut stream = if is_mcap { recording::load(file)? } else { Stream::load(file)? };
+            if let Some(name) = &self.field {
+                stream.field = Field::named_or_load(name)?;
+            }
+            return Ok((vec![stream], false, file.display().to_string()));
         }
         let scenario = Scenario::named(&self.scenario).map_err(|e| Failure::from(e).about("--scenario"))?;
         let seeds = (0..self.seeds).into_par_iter().map(|k| self.seed.wrapping_add(k));
