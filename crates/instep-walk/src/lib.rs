@@ -3,7 +3,7 @@
 //! - [`Walker`]: the whole, as a [`instep_robot::control::Controller`].
 //! - [`StateEstimate`]: what walking knows of its robot, the seam between estimator and controller.
 //! - [`gait`]: stands, starts, steps, stops; [`footsteps`] chooses where to, [`swing`] how, [`whole_body`] with which torques,
-//!   by the quadratic program of [`qp`].
+//!   by the quadratic program of [`instep_qp`].
 //! - [`settings`]: all numbers, with defaults that follow from the robot's size.
 //!
 //! Maths only: no simulator, no clock, no camera, no field. A tick allocates nothing.
@@ -13,7 +13,6 @@ mod error;
 pub mod footsteps;
 pub mod gait;
 pub mod odometry;
-pub mod qp;
 pub mod settings;
 mod state;
 pub mod swing;

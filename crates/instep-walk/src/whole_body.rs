@@ -16,9 +16,9 @@ use instep_robot::control::torque_range;
 use instep_robot::{LinkPoint, Robot, RobotData};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
-use crate::qp::{Qp, QpSolver, QpStatus};
 use crate::settings::{Control, GRAVITY, Task};
 use crate::swing::Waypoint;
+use instep_qp::{Qp, QpSolver, QpStatus};
 
 /// Cost of an acceleration and of a force by themselves: what makes the problem strictly convex.
 const REGULAR: [f64; 2] = [1e-5, 1e-6];
