@@ -1,0 +1,33 @@
+//! What can go wrong with a match.
+
+use instep_behaviour::BehaviourError;
+use instep_field::FieldError;
+
+/// A match that cannot be played.
+#[derive(Debug, thiserror::Error)]
+pub enum MatchError {
+    /// The field.
+    #[error(transparent)]
+    Field(#[from] FieldError),
+    /// A strategy or a table of kicks.
+    #[error(transparent)]
+    Behaviour(#[from] BehaviourError),
+    /// A number that cannot be.
+    #[error("{what}: {found}; expected {expected}")]
+    Value {
+        /// Which.
+        what: &'static str,
+        /// What is there.
+        found: String,
+        /// What would be right.
+        expected: String,
+    },
+    /// The network.
+    #[error("{what}: {source}; expected a UDP address of this machine that is free")]
+    Network {
+        /// What was tried.
+        what: String,
+        /// What the system said.
+        source: std::io::Error,
+    },
+}
