@@ -18,6 +18,15 @@ pub const NORMAL_95: f64 = 1.959_964;
 /// See [`NORMAL_95`].
 pub const NORMAL_99: f64 = 2.575_829;
 
+/// The clocks that a series is measured with, s; they change nothing in its games.
+#[derive(Debug, Clone, Copy)]
+pub struct Clocks {
+    /// For one decision: any fine clock.
+    pub decision: fn() -> f64,
+    /// For a whole game: the present thread's time on a core.
+    pub cpu: fn() -> f64,
+}
+
 /// One game of a series, seen from red.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Game {
@@ -25,6 +34,9 @@ pub struct Game {
     pub goals: [u32; 2],
     /// Goals of the shoot-out.
     pub shootout: [u32; 2],
+    /// Time on a core, s.
+    #[serde(skip)]
+    pub cpu: f64,
     /// What was counted.
     #[serde(skip)]
     pub tally: Tally,
@@ -63,20 +75,20 @@ pub fn play(
     blue: &TeamSetup,
     games: usize,
     seed: u64,
-    clock: Option<fn() -> f64>,
+    clocks: Clocks,
     done: impl Fn() + Sync,
 ) -> std::result::Result<Vec<Game>, MatchError> {
     (0..games)
         .into_par_iter()
         .map(|index| {
             let (mut game, swapped) = game(settings, red, blue, seed, index)?;
-            if let Some(clock) = clock {
-                game.measure(clock);
-            }
+            game.measure(clocks.decision);
+            let began = (clocks.cpu)();
             let Result { score, shootout } = game.play();
+            let cpu = (clocks.cpu)() - began;
             done();
             let order = |[home, away]: [u32; 2]| if swapped { [away, home] } else { [home, away] };
-            Ok(Game { goals: order(score), shootout: order(shootout), tally: game.tally().clone() })
+            Ok(Game { goals: order(score), shootout: order(shootout), cpu, tally: game.tally().clone() })
         })
         .collect()
 }
@@ -98,6 +110,9 @@ pub struct Summary {
     pub differences: BTreeMap<i64, usize>,
     /// Games by score "red-blue".
     pub scores: BTreeMap<String, usize>,
+    /// Time on a core, s.
+    #[serde(skip)]
+    pub cpu: f64,
     /// Sums over all games.
     #[serde(skip)]
     pub tally: Tally,
@@ -119,6 +134,7 @@ impl Summary {
             outcomes: [0; 3],
             differences: BTreeMap::new(),
             scores: BTreeMap::new(),
+            cpu: games.iter().map(|g| g.cpu).sum(),
             tally: Tally::default(),
         };
         for game in games {

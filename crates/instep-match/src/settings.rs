@@ -103,6 +103,18 @@ impl Default for SightSettings {
     }
 }
 
+impl BodySettings {
+    /// The body of a robot of this name; guesses by what teams say of their walks, not measured.
+    pub fn for_robot(name: &str) -> Self {
+        match name {
+            "nao" | "wolfgang" | "prestoe" => {
+                Self { forward: 0.3, side: 0.15, radius: 0.18, feet: 0.08, ..Self::default() }
+            }
+            _ => Self::default(),
+        }
+    }
+}
+
 impl MatchSettings {
     /// The settings for a field's name (one of [`instep_field::FIELD_NAMES`]) or the path of its TOML file.
     ///

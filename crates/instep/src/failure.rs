@@ -5,9 +5,11 @@
 use std::fmt::Display;
 use std::process::ExitCode;
 
+use instep_behaviour::BehaviourError;
 use instep_field::FieldError;
 use instep_kick::KickError;
 use instep_localisation::LocalisationError;
+use instep_match::MatchError;
 use instep_motion::MotionError;
 use instep_report::ReportError;
 use instep_retarget::RetargetError;
@@ -106,6 +108,18 @@ impl From<RosError> for Failure {
             RosError::World(error) => error.into(),
             _ => Self::other(error),
         }
+    }
+}
+
+impl From<BehaviourError> for Failure {
+    fn from(error: BehaviourError) -> Self {
+        Self::input(error)
+    }
+}
+
+impl From<MatchError> for Failure {
+    fn from(error: MatchError) -> Self {
+        Self::input(error)
     }
 }
 

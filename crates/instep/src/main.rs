@@ -6,6 +6,7 @@
 //! right, and nothing was written.
 
 mod bench;
+mod decide;
 mod eval;
 mod failure;
 mod figure;
@@ -14,6 +15,7 @@ mod interrupt;
 mod kick;
 mod learn_table;
 mod locate;
+mod matches;
 mod mujoco_log;
 mod output;
 mod places;
@@ -46,6 +48,8 @@ struct Cli {
 enum Command {
     /// Measure engines, robots and scenarios against each other in one table
     Bench(bench::Bench),
+    /// Tell what a player would do in a situation, and why
+    Decide(decide::Decide),
     /// Measure a policy over seeded trials
     Eval(eval::Eval),
     /// Let a robot kick a ball, from a reference or by an engine, and measure what happens
@@ -54,6 +58,8 @@ enum Command {
     LearnTable(learn_table::LearnTable),
     /// Follow a robot's pose on the field by CLAP, the shipped landmark filter and what others use, on the same data
     Locate(locate::Locate),
+    /// Play games of soccer in the game simulator and compare strategies
+    Match(matches::Match),
     /// Turn a human kick (ASF/AMC or BVH) into a reference for a robot
     Retarget(retarget::Retarget),
     /// Look at a robot's own files
@@ -75,10 +81,12 @@ fn main() -> ExitCode {
     let output = Output::new(cli.json);
     let done = match cli.command {
         Command::Bench(bench) => bench.run(&output),
+        Command::Decide(decide) => decide.run(&output),
         Command::Eval(eval) => eval.run(&output),
         Command::Kick(kick) => kick.run(&output),
         Command::LearnTable(table) => table.run(&output),
         Command::Locate(locate) => locate.run(&output),
+        Command::Match(matches) => matches.run(&output),
         Command::Retarget(retarget) => retarget.run(&output),
         Command::Robot(command) => command.run(&output),
         Command::Ros(ros) => ros.run(&output),

@@ -140,6 +140,24 @@ pub(crate) fn robot(name_or_path: &str) -> Result<Robot, Failure> {
     }
 }
 
+/// The table of kicks that the user means: a path, or the shipped `kicks/kicks.toml`.
+///
+/// # Errors
+/// When there is none.
+pub(crate) fn kicks(path: &Path) -> Result<PathBuf, Failure> {
+    let found = if path.is_relative() { find(path) } else { None };
+    existing_file("--kicks", found.as_deref().unwrap_or(path), "a table of kicks (TOML, or KickBench's JSON)")
+}
+
+/// The strategy that `flag` names: a path, or a shipped one as `strategies/<name>.toml`.
+///
+/// # Errors
+/// When there is none.
+pub(crate) fn strategy(flag: &str, path: &Path) -> Result<PathBuf, Failure> {
+    let found = if path.is_relative() { find(path) } else { None };
+    existing_file(flag, found.as_deref().unwrap_or(path), "a strategy (TOML)")
+}
+
 /// Names of the robots that can be found.
 fn robots() -> Vec<String> {
     let mut names: Vec<String> = roots()

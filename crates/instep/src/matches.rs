@@ -1,0 +1,212 @@
+//! `instep match`: games in the game simulator; how two strategies compare, and one game to look at.
+
+mod page;
+
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::{Arc, LazyLock};
+use std::time::Instant;
+
+use clap::Args;
+use instep_behaviour::{KickTable, Strategy, Which};
+use instep_bench::cpu::thread_seconds;
+use instep_match::series::{self, Clocks, NORMAL_95, NORMAL_99, Summary};
+use instep_match::{BodySettings, MatchSettings, TeamSetup};
+
+use crate::failure::Failure;
+use crate::output::{self, Output, Paint};
+use crate::{files, places};
+
+/// The arguments of `instep match`.
+#[derive(Debug, Args)]
+pub(crate) struct Match {
+    /// The league's rules and field: adult-2024, kid, hsl-s, hsl-m, hsl-l, simulation, fifa, or a field's TOML file
+    #[arg(long, value_name = "RULES", default_value = "adult-2024")]
+    rules: String,
+    /// Red's strategy [default: Instep's own]
+    #[arg(long, value_name = "FILE")]
+    red: Option<PathBuf>,
+    /// Blue's strategy [default: Instep's own]
+    #[arg(long, value_name = "FILE")]
+    blue: Option<PathBuf>,
+    /// How many games
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
+    games: u64,
+    /// Seed of the first game
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Players of a team [default: by the rules]
+    #[arg(long, value_name = "N")]
+    players: Option<usize>,
+    /// A draw is followed by extra time and a shoot-out, as the rules have them
+    #[arg(long)]
+    knockout: bool,
+    /// How exact each kick is: TOML, or the JSON that `instep bench` writes
+    #[arg(long, value_name = "FILE", default_value = "kicks/kicks.toml")]
+    kicks: PathBuf,
+    /// Whose kicks and walk [default: nao for kid and hsl-s, else artemis]
+    #[arg(long, value_name = "ROBOT")]
+    robot: Option<String>,
+    /// Only this engine's kicks
+    #[arg(long, value_name = "ENGINE")]
+    engine: Option<String>,
+    /// Write the first game as a replay for the browser: decisions, pass circles, beliefs and roles over the field
+    #[arg(long, value_name = "FILE")]
+    save: Option<PathBuf>,
+    /// The same as out/match/replay.html, opened in the browser
+    #[arg(long, conflicts_with = "save")]
+    watch: bool,
+}
+
+/// Seconds of a clock that only differences are taken of.
+fn clock() -> f64 {
+    static START: LazyLock<Instant> = LazyLock::new(Instant::now);
+    START.elapsed().as_secs_f64()
+}
+
+impl Match {
+    /// Runs the command.
+    ///
+    /// # Errors
+    /// When a file cannot be used or written.
+    pub(crate) fn run(&self, output: &Output) -> Result<ExitCode, Failure> {
+        let mut settings = MatchSettings::new(&self.rules, self.players)?;
+        settings.knockout = self.knockout;
+        let small = matches!(settings.field.name.as_str(), "kid" | "hsl-s");
+        let robot = self.robot.as_deref().unwrap_or(if small { "nao" } else { "artemis" });
+        settings.body = BodySettings::for_robot(robot);
+        let path = places::kicks(&self.kicks)?;
+        let which = Which { engine: self.engine.as_deref(), robot };
+        let kicks = Arc::new(KickTable::load(&path)?.only(which, &path.display().to_string())?);
+        let setup = |flag: &str, path: &Option<PathBuf>| -> Result<TeamSetup, Failure> {
+            let strategy = match path {
+                Some(path) => Strategy::load(&places::strategy(flag, path)?)?,
+                None => Strategy::default(),
+            };
+            Ok(TeamSetup { strategy: Arc::new(strategy), kicks: kicks.clone() })
+        };
+        let (red, blue) = (setup("--red", &self.red)?, setup("--blue", &self.blue)?);
+        let settings = Arc::new(settings);
+        let replay = self.save.as_deref().map(|file| files::with_ending(file, "html"));
+        let replay = replay.or_else(|| self.watch.then(|| Path::new("out/match/replay.html").to_owned()));
+        if let Some(file) = &replay {
+            files::check_file(file)?;
+            self.replay(file, &settings, &red, &blue)?;
+            output.remark(|paint| format!("{} {}", paint.faint("replay of the first game:"), file.display()));
+        }
+        let bar = output::bar(self.games, "{pos}/{len} games {wide_bar} {eta}");
+        let clocks = Clocks { decision: clock, cpu: thread_seconds };
+        let games = series::play(&settings, &red, &blue, self.games as usize, self.seed, clocks, || bar.inc(1))?;
+        bar.finish_and_clear();
+        let summary = Summary::of(&games);
+        let names = [red.strategy.name.as_str(), blue.strategy.name.as_str()];
+        output.show(&json(&summary, names, self), |paint| text(&summary, names, &settings, paint))?;
+        Ok(ExitCode::SUCCESS)
+    }
+
+    /// Plays the first game once more, recorded, and writes it as a page.
+    fn replay(
+        &self,
+        file: &Path,
+        settings: &Arc<MatchSettings>,
+        red: &TeamSetup,
+        blue: &TeamSetup,
+    ) -> Result<(), Failure> {
+        let (mut game, _) = series::game(settings, red, blue, self.seed, 0)?;
+        game.record();
+        game.play();
+        let Some(recording) = game.take_recording() else { return Ok(()) };
+        let names = [red.strategy.name.as_str(), blue.strategy.name.as_str()];
+        let page = page::page(&recording, &settings.field, names).map_err(Failure::other)?;
+        let mut batch = files::Batch::default();
+        let staged = batch.stage(file)?;
+        std::fs::write(&staged, page)
+            .map_err(|e| Failure::input(format!("{}: cannot be written: {e}", file.display())))?;
+        batch.commit()?;
+        if self.watch {
+            page::open(file);
+        }
+        Ok(())
+    }
+}
+
+/// What every game of a series gave, for machines.
+fn json(summary: &Summary, names: [&str; 2], args: &Match) -> serde_json::Value {
+    let [low, high] = summary.interval(NORMAL_95);
+    let [low_99, high_99] = summary.interval(NORMAL_99);
+    let tally = &summary.tally;
+    let per_minute = 60.0 / tally.open_play.max(1e-9);
+    let games = summary.games as f64;
+    let histogram: Vec<_> = summary
+        .differences
+        .iter()
+        .map(|(difference, games)| serde_json::json!({ "difference": difference, "games": games }))
+        .collect();
+    serde_json::json!({
+        "games": summary.games,
+        "seed": args.seed,
+        "rules": args.rules,
+        "red": { "strategy": names[0], "goals_mean": summary.goals_mean[0] },
+        "blue": { "strategy": names[1], "goals_mean": summary.goals_mean[1] },
+        "difference_mean": summary.difference_mean,
+        "difference_low": low,
+        "difference_high": high,
+        "difference_low_99": low_99,
+        "difference_high_99": high_99,
+        "won": summary.outcomes[0],
+        "drawn": summary.outcomes[1],
+        "lost": summary.outcomes[2],
+        "histogram": histogram,
+        "scores": summary.scores,
+        "kicks_mean": f64::from(tally.kicks) / games,
+        "removals_mean": f64::from(tally.removals) / games,
+        "falls_mean": f64::from(tally.falls) / games,
+        "restarts_mean": f64::from(tally.restarts) / games,
+        "role_changes_per_minute": f64::from(tally.role_changes) * per_minute,
+        "role_flickers_per_minute": f64::from(tally.role_flickers) * per_minute,
+        "decisions": tally.decisions,
+        "real_time_factor": tally.simulated / summary.cpu,
+        "decision_p50_s": tally.decision_quantile(0.5),
+        "decision_p99_s": tally.decision_quantile(0.99),
+    })
+}
+
+fn text(summary: &Summary, names: [&str; 2], settings: &MatchSettings, paint: Paint) -> String {
+    let mut text = String::new();
+    let [low, high] = summary.interval(NORMAL_95);
+    let [red, blue] = summary.goals_mean;
+    let [won, drawn, lost] = summary.outcomes;
+    let n = settings.players;
+    let _ = writeln!(text, "{} games of {n} against {n} on {}", summary.games, settings.field.name);
+    let _ = writeln!(text, "red  {:<10} {red:.2} goals a game", names[0]);
+    let _ = writeln!(text, "blue {:<10} {blue:.2} goals a game", names[1]);
+    let difference = format!("{:+.3}", summary.difference_mean);
+    let verdict = if low > 0.0 {
+        paint.good(&difference)
+    } else if high < 0.0 {
+        paint.bad(&difference)
+    } else {
+        difference
+    };
+    let _ = writeln!(
+        text,
+        "red's goal difference {verdict}, 95 % from {low:+.3} to {high:+.3}; won {won}, drawn {drawn}, lost {lost}"
+    );
+    let most = summary.differences.values().copied().max().unwrap_or(1).max(1);
+    for (difference, games) in &summary.differences {
+        let bar = "█".repeat((40 * games).div_ceil(most));
+        let bar = if *difference > 0 { paint.bad(&bar) } else { paint.faint(&bar) };
+        let _ = writeln!(text, "{difference:>+4} {games:>6} {bar}");
+    }
+    let tally = &summary.tally;
+    let _ = writeln!(
+        text,
+        "{:.0} x real time a core; a decision p50 {:.1} us, p99 {:.1} us; role flickers {:.3} a minute and player",
+        tally.simulated / summary.cpu,
+        1e6 * tally.decision_quantile(0.5),
+        1e6 * tally.decision_quantile(0.99),
+        f64::from(tally.role_flickers) * 60.0 / tally.open_play.max(1e-9)
+    );
+    text
+}
