@@ -177,6 +177,7 @@ fn would_be_seen(own: &Pose, yaw: f64, view: &View, others: &[Circle], point: Po
 #[derive(Debug, Clone, Default)]
 pub struct OpponentMemory {
     tracks: ArrayVec<OpponentTrack, MAX_TEAM>,
+    updated: f64,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -189,7 +190,9 @@ struct OpponentTrack {
 
 impl OpponentMemory {
     /// One camera frame; `most` is how many opponents there can be.
-    pub fn update(&mut self, time: f64, dt: f64, own: &Pose, yaw: f64, view: &View, sight: &Sight, most: usize) {
+    pub fn update(&mut self, time: f64, own: &Pose, yaw: f64, view: &View, sight: &Sight, most: usize) {
+        let dt = (time - self.updated).clamp(0.0, 1.0);
+        self.updated = time;
         for seen in &sight.opponents {
             let place = own.outer_from_local(*seen);
             let nearest = self
@@ -307,13 +310,13 @@ mod tests {
         for i in 0..10 {
             let mut sight = Sight::default();
             sight.opponents.push([3.0 + f64::from(i) * 0.05, 0.5]);
-            memory.update(f64::from(i) / 10.0, 0.1, &ORIGIN, 0.0, &View::default(), &sight, 3);
+            memory.update(f64::from(i) / 10.0, &ORIGIN, 0.0, &View::default(), &sight, 3);
         }
         memory.list(&mut list);
         assert_eq!(list.len(), 1);
         assert!((list[0].circle.center[0] - 3.45).abs() < 0.15, "{list:?}");
         for i in 10..25 {
-            memory.update(f64::from(i) / 10.0, 0.1, &ORIGIN, 0.0, &View::default(), &Sight::default(), 3);
+            memory.update(f64::from(i) / 10.0, &ORIGIN, 0.0, &View::default(), &Sight::default(), 3);
         }
         memory.list(&mut list);
         assert!(list.is_empty());

@@ -28,7 +28,7 @@ pub(crate) fn place(pitch: &Pitch, beliefs: &Beliefs, role: Role, nth: usize) ->
         }
         Role::Supporter => {
             // On the side with more room, further ahead for each further one.
-            let side = if ball[1] > 0.0 { -1.0 } else { 1.0 } * if nth % 2 == 0 { 1.0 } else { -1.0 };
+            let side = if ball[1] > 0.0 { -1.0 } else { 1.0 } * if nth.is_multiple_of(2) { 1.0 } else { -1.0 };
             let ahead = settings.support_ahead * (1.0 - 0.5 * nth as f64);
             [ball[0] + ahead, ball[1] + side * settings.support_beside]
         }
@@ -71,7 +71,7 @@ pub(crate) fn kick_off(pitch: &Pitch, beliefs: &Beliefs) -> Pose {
         0 if ours => [-0.6, 0.0],
         0 => [-radius - 0.1, 0.0],
         n => {
-            let side = if n % 2 == 0 { -1.0 } else { 1.0 };
+            let side = if n.is_multiple_of(2) { -1.0 } else { 1.0 };
             let row = (n - 1) / 2;
             let beside = (0.25 * field.width + 0.6 * row as f64).min(field.width / 2.0 - 0.6);
             let back = if ours && row == 0 { 0.8 } else { radius + 0.6 + row as f64 };

@@ -91,7 +91,7 @@ fn wanted(pitch: &Pitch, beliefs: &Beliefs, present: Role) -> Role {
         left.push((mate.number, mate.pose.position(), mate.role));
     }
     for slot in 0..left.len() {
-        let role = if (slot % 2 == 0) == settings.defender_first { Role::Defender } else { Role::Supporter };
+        let role = if slot.is_multiple_of(2) == settings.defender_first { Role::Defender } else { Role::Supporter };
         let place = positions::place(pitch, beliefs, role, slot / 2).position();
         let cost =
             |(_, at, has): &(u8, crate::Point, Role)| distance(*at, place) - if *has == role { 1.0 } else { 0.0 };

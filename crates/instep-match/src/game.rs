@@ -88,7 +88,7 @@ impl Match {
             for number in 1..=settings.players as u8 {
                 let head = Player::new(field.clone(), setup.strategy.clone(), setup.kicks.clone())?;
                 // Beside the own half, as teams enter; in the team's own frame.
-                let side = if number % 2 == 0 { 1.0 } else { -1.0 };
+                let side = if number.is_multiple_of(2) { 1.0 } else { -1.0 };
                 let x = -0.12 * field.length - 0.35 * field.length * f64::from(number - 1) / settings.players as f64;
                 let own = Pose::new(x, side * field.width / 2.0, -side * PI / 2.0);
                 let pose = if team == 0 { own } else { own.mirrored() };
@@ -168,6 +168,11 @@ impl Match {
     /// The referee, for scenarios and for the official program.
     pub fn referee_mut(&mut self) -> &mut Referee {
         &mut self.referee
+    }
+
+    /// What it is played with.
+    pub fn settings(&self) -> &MatchSettings {
+        &self.settings
     }
 
     /// What was counted.
@@ -251,7 +256,7 @@ impl Match {
         }
         self.referee.events.clear();
         let every = (1.0 / (RATE * STEP)) as u64;
-        if self.recording.is_some() && (self.tick % every == 0 || self.referee.ended) {
+        if self.recording.is_some() && (self.tick.is_multiple_of(every) || self.referee.ended) {
             let frame = Frame::of(self);
             if let Some(recording) = &mut self.recording {
                 recording.frames.push(frame);
@@ -264,7 +269,7 @@ impl Match {
         let time = self.time();
         self.tell_of_restart(time);
         for i in 0..self.robots.len() {
-            if (self.tick + i as u64) % DECIDE_EVERY == 0 {
+            if (self.tick + i as u64).is_multiple_of(DECIDE_EVERY) {
                 self.see_and_decide(i, time);
             }
         }
@@ -367,15 +372,7 @@ impl Match {
         shadows.extend(beliefs.opponents.iter().map(|o| Circle { radius: 0.15, ..o.circle }));
         // The frame was taken from where the robot believed to be then.
         beliefs.ball.update(time, &frame.own, frame.yaw, &sight.view, &shadows, &frame.sight);
-        robot.opponents.update(
-            time,
-            dt,
-            &frame.own,
-            frame.yaw,
-            &sight.view,
-            &frame.sight,
-            settings.players.min(MAX_TEAM),
-        );
+        robot.opponents.update(time, &frame.own, frame.yaw, &sight.view, &frame.sight, settings.players.min(MAX_TEAM));
         robot.opponents.list(&mut beliefs.opponents);
         if let Some((position, velocity, age)) = heard {
             beliefs.ball.hear(time, position, velocity, age);

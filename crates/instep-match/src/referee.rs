@@ -778,7 +778,7 @@ impl Referee {
         self.tell(court.time, EventKind::Shot { team: shooter, scored });
         self.shots += 1;
         let [a, b] = self.shootout;
-        let (round_over, regular) = (self.shots % 2 == 0, 2 * self.book.shots);
+        let (round_over, regular) = (self.shots.is_multiple_of(2), 2 * self.book.shots);
         let left = (regular.saturating_sub(self.shots)).div_ceil(2);
         let decided = self.shots < regular && a.abs_diff(b) > left;
         let sudden = self.shots >= regular && round_over && a != b;
@@ -800,6 +800,11 @@ impl Referee {
             let p = court.ball.position;
             self.spot = [p[0].clamp(-x, x), p[1].clamp(-y, y)];
         }
+    }
+
+    /// The official program has changed the state.
+    pub(crate) fn mark(&mut self, time: f64) {
+        self.since = time;
     }
 
     /// The official program begins a restart: the ball to its spot.
