@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use instep_kick::adaptive::{AdaptiveKick, AdaptiveSettings, Stabiliser, load_grid};
+use instep_kick::adaptive::{AdaptiveKick, AdaptiveSettings, GRID_FILE, Stabiliser, load_grid};
 use instep_kick::dynamic::{DynamicKick, DynamicSettings};
 use instep_kick::policy::{LearnedKick, PolicySettings};
 use instep_kick::preview::{PreviewKick, PreviewSettings};
-use instep_kick::{BallModel, KickEngine, Settings};
+use instep_kick::{BallModel, Build, Derive, KickEngine, Settings};
 use instep_robot::Robot;
 use instep_sim::settings::{Ball, WorldSettings};
 
@@ -25,6 +25,23 @@ struct Entry {
     file: &'static str,
     /// Makes it from that file's path and text.
     make: fn(&Subject, &str, &str) -> Made,
+}
+
+impl Entry {
+    /// The engine that it is a form of.
+    fn family(&self) -> &str {
+        self.name.split('-').next().unwrap_or(self.name)
+    }
+
+    /// Whether it can do without a file: settings that were found by tuning, and policies, cannot.
+    fn follows_from_robot(&self) -> bool {
+        self.file.strip_suffix(".toml") == Some(self.family()) && self.family() != "policy"
+    }
+
+    /// Whether it looks its strokes up in a measured grid.
+    fn needs_grid(&self) -> bool {
+        self.family() == "adaptive"
+    }
 }
 
 /// Every engine: one line each.
@@ -117,8 +134,6 @@ impl Subject {
         let data = robot.data();
         let [left, right] = [0, 1].map(|side| data.point(&robot.legs[side].sole));
         let middle = 0.5 * (left + right);
-        let leg = &robot.legs[0];
-        let length = |a: usize, b: usize| (data.link_position(a) - data.link_position(b)).norm();
         let strikers = robot.legs.iter().flat_map(|leg| &leg.strike);
         let toes = strikers
             .map(|&geom| {
@@ -127,7 +142,7 @@ impl Subject {
             })
             .fold(0.0, f64::max);
         let size = Size {
-            leg: length(leg.thigh, leg.shank) + length(leg.shank, leg.foot) - leg.sole.point.z.min(0.0),
+            leg: robot.leg_length(),
             half_width: 0.5 * (left.y - right.y).abs(),
             toes,
             ball: ball.radius,
@@ -151,7 +166,7 @@ impl Subject {
         self.settings(name).is_ok()
     }
 
-    /// The text of the settings of the engine called `name`: TOML.
+    /// The settings of the engine called `name`, whole, as TOML: what its file says and for the rest what follows from the robot.
     ///
     /// # Errors
     /// When there is no such engine, or none for this robot.
@@ -160,13 +175,30 @@ impl Subject {
         if let Some(text) = self.settings.get(entry.file) {
             return Ok(text.clone());
         }
-        let file = self.folder.join(entry.file);
-        if !file.exists() {
+        let lacks = |file: &Path| {
             let robot = self.robot.name.clone();
-            return Err(BenchError::NotForRobot { engine: name.into(), robot, file: file.display().to_string() });
+            BenchError::NotForRobot { engine: name.into(), robot, file: file.display().to_string() }
+        };
+        let (file, grid) = (self.folder.join(entry.file), self.folder.join(GRID_FILE));
+        if entry.needs_grid() && !grid.exists() {
+            return Err(lacks(&grid));
         }
-        std::fs::read_to_string(&file)
-            .map_err(|e| BenchError::File { file: file.display().to_string(), detail: e.to_string() })
+        let text = match std::fs::read_to_string(&file) {
+            Ok(text) => text,
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound && entry.follows_from_robot() => String::new(),
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Err(lacks(&file)),
+            Err(error) => return Err(BenchError::File { file: file.display().to_string(), detail: error.to_string() }),
+        };
+        let (build, file) = (Build::of(&self.robot, &self.ball), file.display().to_string());
+        let whole = |settings: Result<String, toml::ser::Error>| {
+            settings.map_err(|e| BenchError::File { file: file.clone(), detail: e.to_string() })
+        };
+        match entry.family() {
+            "dynamic" => whole(toml::to_string(&DynamicSettings::of(&build, &file, &text)?)),
+            "adaptive" => whole(toml::to_string(&AdaptiveSettings::of(&build, &file, &text)?)),
+            "preview" => whole(toml::to_string(&PreviewSettings::of(&build, &file, &text)?)),
+            _ => Ok(text),
+        }
     }
 
     /// The same robot with other settings, the text of a TOML file, for the engine called `name` and those that share its file.

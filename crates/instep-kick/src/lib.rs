@@ -3,6 +3,7 @@
 //! - [`request`]: what is asked, and the causes of a refusal; [`dialect`]: the request formats that teams already send.
 //! - [`ball`]: the ball that a robot plays.
 //! - [`settings`]: the files of a robot's folder, read and checked.
+//! - [`derive`]: those settings as they follow from a robot, so that a file holds only what differs.
 //! - [`engine`]: the trait that every engine implements.
 //! - [`adaptive`]: paper 3's engine: retraction and strike in a measured reachability grid, following the ball.
 //! - [`dynamic`]: paper 2's engine: splines of foot and trunk in the support foot's frame, stabilised by the centre of
@@ -17,6 +18,7 @@
 
 pub mod adaptive;
 pub mod ball;
+pub mod derive;
 pub mod dialect;
 pub mod dynamic;
 pub mod engine;
@@ -33,6 +35,7 @@ pub mod tree;
 pub mod whole_body;
 
 pub use ball::BallModel;
+pub use derive::{Build, Derive};
 pub use engine::{BreakOff, Face, KickEngine, KickPlan, KickStart, KickStatus, Phase, Progress};
 pub use error::KickError;
 pub use playback::Playback;

@@ -310,6 +310,16 @@ impl Robot {
         self.model.body_subtreemass()[self.base]
     }
 
+    /// Length of the left leg: in the stand from the hip's pitch joint to the knee, to the ankle, and down to the sole, m.
+    #[must_use]
+    pub fn leg_length(&self) -> f64 {
+        let (data, leg) = (self.data(), &self.legs[0]);
+        // Joint 0 of the model is the base's free joint.
+        let hip = self.model.jnt_bodyid().get(leg.hip_pitch + 1).and_then(|&link| usize::try_from(link).ok());
+        let length = |a: usize, b: usize| (data.link_position(a) - data.link_position(b)).norm();
+        length(hip.unwrap_or(leg.thigh), leg.shank) + length(leg.shank, leg.foot) - leg.sole.point.z.min(0.0)
+    }
+
     /// The leg on `side`.
     #[must_use]
     pub fn leg(&self, side: Side) -> &Leg {

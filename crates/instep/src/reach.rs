@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use clap::Args;
 use instep_bench::reach::measure;
-use instep_kick::Settings;
+use instep_kick::{BallModel, Build, Derive, Settings};
 use instep_kick::adaptive::grid::{CELL, CELLS, Grid};
 use instep_kick::adaptive::{AdaptiveSettings, GRID_FILE, grid_hash};
 use instep_report::{Axis, Color, Column, Plot, Report, Series, SummaryItem, Table, Verdict};
@@ -38,7 +38,8 @@ impl Reach {
     pub(crate) fn run(self, output: &Output) -> Result<ExitCode, Failure> {
         let robot = Arc::new(places::robot(&self.robot)?);
         let folder = robot.folder().to_owned();
-        let settings = AdaptiveSettings::load(&folder).map_err(Failure::input)?;
+        let ball = BallModel::load(&folder).map_err(Failure::input)?;
+        let settings = AdaptiveSettings::of_folder(&Build::of(&robot, &ball), &folder).map_err(Failure::input)?;
         let file = folder.join(GRID_FILE);
         files::check_file(&file)?;
         if let Some(report) = &self.report {

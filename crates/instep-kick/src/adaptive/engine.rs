@@ -24,6 +24,7 @@ use crate::adaptive::plan::{Planner, check, precision, push};
 use crate::adaptive::settings::AdaptiveSettings;
 use crate::adaptive::{GRID_FILE, grid_hash, parts};
 use crate::ball::BallModel;
+use crate::derive::{Build, Derive};
 use crate::engine::{BreakOff, Face, KickEngine, KickPlan, KickStatus, Phase, Progress};
 use crate::ik::Ik;
 use crate::request::{KickRequest, Place, Refusal, Strength};
@@ -158,12 +159,13 @@ impl AdaptiveKick {
     /// The engine for `robot` with the ball, the settings and the grid in its folder.
     ///
     /// # Errors
-    /// As [`BallModel::load`], [`AdaptiveSettings::load`], [`load_grid`] and [`AdaptiveKick::new`].
+    /// As [`BallModel::load`], [`Derive::of_folder`], [`load_grid`] and [`AdaptiveKick::new`].
     pub fn load(robot: Arc<Robot>) -> Result<Self, KickError> {
         let folder = robot.folder().to_owned();
-        let settings = AdaptiveSettings::load(&folder)?;
+        let ball = BallModel::load(&folder)?;
+        let settings = AdaptiveSettings::of_folder(&Build::of(&robot, &ball), &folder)?;
         let grid = load_grid(&folder)?;
-        Self::new(robot, BallModel::load(&folder)?, settings, Arc::new(grid))
+        Self::new(robot, ball, settings, Arc::new(grid))
     }
 
     /// Its settings.

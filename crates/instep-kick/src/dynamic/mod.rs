@@ -22,6 +22,7 @@ use instep_robot::control::{Controller, JointCommand, Sensors};
 
 use crate::KickError;
 use crate::ball::BallModel;
+use crate::derive::{Build, Derive};
 use crate::engine::{KickEngine, KickPlan, KickStatus, Phase, Progress};
 use crate::ik::Ik;
 use crate::request::{KickRequest, Place, Refusal};
@@ -94,11 +95,12 @@ impl DynamicKick {
     /// The engine for `robot` with the ball and the settings in its folder.
     ///
     /// # Errors
-    /// As [`BallModel::load`], [`DynamicSettings::load`] and [`DynamicKick::new`].
+    /// As [`BallModel::load`], [`Derive::of_folder`] and [`DynamicKick::new`].
     pub fn load(robot: Arc<Robot>) -> Result<Self, KickError> {
         let folder = robot.folder().to_owned();
-        let settings = DynamicSettings::load(&folder)?;
-        Self::new(robot, BallModel::load(&folder)?, settings)
+        let ball = BallModel::load(&folder)?;
+        let settings = DynamicSettings::of_folder(&Build::of(&robot, &ball), &folder)?;
+        Self::new(robot, ball, settings)
     }
 
     /// Its settings.

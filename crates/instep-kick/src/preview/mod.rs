@@ -29,6 +29,7 @@ use nalgebra::Vector3;
 
 use crate::KickError;
 use crate::ball::BallModel;
+use crate::derive::{Build, Derive};
 use crate::engine::{KickEngine, KickPlan, Phase, Progress};
 use crate::ik::{Goals, Ik, Residual};
 use crate::request::{KickRequest, Refusal};
@@ -188,11 +189,12 @@ impl PreviewKick {
     /// The engine for `robot` with the ball and the settings in its folder.
     ///
     /// # Errors
-    /// As [`BallModel::load`], [`PreviewSettings::load`] and [`PreviewKick::new`].
+    /// As [`BallModel::load`], [`Derive::of_folder`] and [`PreviewKick::new`].
     pub fn load(robot: Arc<Robot>) -> Result<Self, KickError> {
         let folder = robot.folder().to_owned();
-        let settings = PreviewSettings::load(&folder)?;
-        Self::new(robot, BallModel::load(&folder)?, settings)
+        let ball = BallModel::load(&folder)?;
+        let settings = PreviewSettings::of_folder(&Build::of(&robot, &ball), &folder)?;
+        Self::new(robot, ball, settings)
     }
 
     /// Its settings.

@@ -82,8 +82,7 @@ impl Body {
         });
         let half_width = 0.5 * stands[0].home.y.abs();
         let leg = &robot.legs[0];
-        let length = |a: usize, b: usize| (pose.position[a] - pose.position[b]).norm();
-        let leg_length = length(leg.thigh, leg.shank) + length(leg.shank, leg.foot) - leg.sole.point.z.min(0.0);
+        let leg_length = robot.leg_length();
         let arms = wanted
             .iter()
             .map(|(name, &angle)| {
