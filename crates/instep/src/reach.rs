@@ -7,9 +7,9 @@ use std::time::Instant;
 
 use clap::Args;
 use instep_bench::reach::measure;
-use instep_kick::{BallModel, Build, Derive, Settings};
 use instep_kick::adaptive::grid::{CELL, CELLS, Grid};
 use instep_kick::adaptive::{AdaptiveSettings, GRID_FILE, grid_hash};
+use instep_kick::{BallModel, Build, Derive, Settings};
 use instep_report::{Axis, Color, Column, Plot, Report, Series, SummaryItem, Table, Verdict};
 use instep_robot::Robot;
 

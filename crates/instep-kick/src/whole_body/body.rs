@@ -81,7 +81,6 @@ impl Body {
             }
         });
         let half_width = 0.5 * stands[0].home.y.abs();
-        let leg = &robot.legs[0];
         let leg_length = robot.leg_length();
         let arms = wanted
             .iter()
