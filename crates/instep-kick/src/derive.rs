@@ -216,7 +216,7 @@ fn line_of(text: &str, key: &str) -> Option<usize> {
             .strip_prefix(key)
             .is_some_and(|rest| rest.trim_start().starts_with(['=', ']', '.']))
     };
-    text.lines().position(|line| names(line)).map(|at| at + 1)
+    text.lines().position(names).map(|at| at + 1)
 }
 
 impl Derive for DynamicSettings {
