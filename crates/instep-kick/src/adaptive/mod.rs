@@ -62,14 +62,11 @@ fn parts(robot: Arc<Robot>, ball: BallModel, settings: &AdaptiveSettings) -> Res
 pub fn grid_hash(robot: &Robot, settings: &AdaptiveSettings) -> u64 {
     let model = robot.model();
     let l = &settings.limits;
-    // Named one by one, so that what the grid does not depend on (a drive's delay, say) makes no grid stale.
-    let joints = robot.joints.iter().map(|j| (&j.name, j.range, j.torque, j.speed, j.corner, j.kp, j.kd));
-    let legs = robot.legs.iter().map(|leg| (leg.joints().collect::<Vec<_>>(), leg.sole, &leg.strike));
     let text = format!(
         "{} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?}",
         robot.name,
-        joints.collect::<Vec<_>>(),
-        legs.collect::<Vec<_>>(),
+        robot.joints.iter().map(|j| (&j.name, j.range, j.torque, j.speed, j.corner, j.kp, j.kd)).collect::<Vec<_>>(),
+        robot.legs.iter().map(|leg| (leg.thigh, leg.shank, leg.foot, &leg.sole, &leg.strike)).collect::<Vec<_>>(),
         robot.contacts,
         robot.self_collision,
         robot.stand,
