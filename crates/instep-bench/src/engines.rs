@@ -11,8 +11,10 @@ use instep_kick::preview::{PreviewKick, PreviewSettings};
 use instep_kick::{BallModel, Build, Derive, KickEngine, Settings};
 use instep_robot::Robot;
 use instep_sim::settings::{Ball, WorldSettings};
+use instep_walk::in_gait::InGaitSettings;
 
 use crate::BenchError;
+use crate::in_gait::InGaitKick;
 use crate::scenario::Size;
 
 /// An engine that was made for a robot, or why not.
@@ -86,12 +88,14 @@ const ENTRIES: &[Entry] = &[
             subject.adaptive(file, text, |settings| settings.stabiliser = Stabiliser::Inclination)
         },
     },
+    Entry { name: "in-gait", file: "in-gait.toml", make: |subject, file, text| subject.in_gait(file, text) },
     Entry { name: "policy", file: "policy.toml", make: |subject, file, text| subject.policy(file, text) },
 ];
 
 /// Names of the engines. `dynamic-open` is `dynamic` with its closed loop off, `…-tuned` an engine with the settings that
 /// `instep tune` found. `adaptive-once` plans the retraction once, `adaptive-sphere` takes the foot for a sphere,
-/// `adaptive-inclination` has the paper's stabiliser. `policy` starts in a run-up.
+/// `adaptive-inclination` has the paper's stabiliser. `policy` starts in a
+/// run-up, `in-gait` from the stand a run-up away from the ball.
 pub fn engines() -> impl Iterator<Item = &'static str> {
     ENTRIES.iter().map(|entry| entry.name)
 }
@@ -245,6 +249,11 @@ impl Subject {
         let settings = PolicySettings::parse(file, text)?;
         let policy = settings.load_policy(&self.folder)?;
         Ok(Box::new(LearnedKick::new(&self.robot, self.ball, &policy, settings)?))
+    }
+
+    fn in_gait(&self, file: &str, text: &str) -> Made {
+        let settings = InGaitSettings::parse(file, text)?;
+        Ok(Box::new(InGaitKick::new(&self.robot, self.ball, settings, self.footprint)?))
     }
 
     fn adaptive(&self, file: &str, text: &str, change: fn(&mut AdaptiveSettings)) -> Made {

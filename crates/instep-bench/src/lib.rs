@@ -4,7 +4,7 @@
 //! - [`engines`]: which engines there are, and what a robot brings to its trials.
 //! - [`cell`]: one engine, robot, scenario and seed, run and measured.
 //! - [`reach`]: the reachability grid of the adaptive kick, measured in the world.
-//! - [`walking`]: one walk, run and measured.
+//! - [`in_gait`]: the kick within a step as an engine; [`walking`]: one walk, run and measured.
 //! - [`run`]: all cells on all cores, with a file to resume from.
 //! - [`directions`]: how far the ball goes off the asked direction, and whether the engine knew.
 //! - [`table`] and [`page`]: Markdown, CSV, JSON and HTML.
@@ -17,6 +17,7 @@ pub mod cpu;
 pub mod directions;
 pub mod engines;
 mod error;
+pub mod in_gait;
 pub mod page;
 pub mod reach;
 pub mod run;

@@ -149,6 +149,14 @@ pub enum Refusal {
         /// Largest distance, m.
         reach: f64,
     },
+    /// The ball rolls, and the engine kicks one that rests.
+    #[error("the ball rolls at {speed:.2} m/s; this engine kicks a ball that rests (at most {most:.2} m/s)")]
+    BallRolls {
+        /// Its speed, m/s.
+        speed: f64,
+        /// Largest speed, m/s.
+        most: f64,
+    },
     /// No foot pose on the way is within the joints' ranges.
     #[error("the {foot} foot misses its {place} by {gap:.3} m within the joints' ranges")]
     Unreachable {
@@ -361,6 +369,7 @@ impl Refusal {
             Self::BallBehind { .. } => "ball_behind",
             Self::BallUnderRobot { .. } => "ball_under_robot",
             Self::TooFar { .. } => "too_far",
+            Self::BallRolls { .. } => "ball_rolls",
             Self::Unreachable { .. } => "unreachable",
             Self::SelfCollision { .. } => "self_collision",
             Self::HitsGround { .. } => "hits_ground",

@@ -79,6 +79,30 @@ impl Pendulum {
         let start = (wanted - end.momentum * (self.alpha * ch)) / (self.lambda * sh);
         end.position - start
     }
+
+    /// Where the support foot of the step that is `steps` from now stands, from the present contact, m, when the gait of
+    /// `velocity` goes on straight ahead; `support` is the present one, and `left` (s) of its step are left. Affine in
+    /// `velocity`.
+    #[must_use]
+    pub fn contact_after(
+        &self,
+        state: &PendulumState,
+        left: f64,
+        velocity: Vector2<f64>,
+        support: Side,
+        steps: usize,
+    ) -> Vector2<f64> {
+        let (mut state, mut left, mut next) = (*state, left, support.other());
+        let mut contact = Vector2::zeros();
+        for _ in 0..steps {
+            let foothold = self.foothold(&state, left, velocity, 0.0, next);
+            let end = self.ahead(&state, left);
+            contact += foothold;
+            state = PendulumState { position: end.position - foothold, momentum: end.momentum };
+            (left, next) = (self.step_time, next.other());
+        }
+        contact
+    }
 }
 
 #[cfg(test)]

@@ -18,12 +18,17 @@ use crate::swing::{Swing, Waypoint};
 use crate::whole_body::{Outcome, Targets, WholeBody};
 use crate::{StateEstimate, WalkError};
 
-/// Farthest that the capture point may be from the middle of the feet, as a share of the width, when a gait ends.
-const STOP_CAPTURE: f64 = 0.45;
-/// Farthest apart that the feet may be ahead when a gait ends, as a share of the width.
-const STOP_STAGGER: f64 = 0.4;
-/// Farthest that the capture point may be from the feet's middle before a standing robot steps, as a share of the width.
-const BALANCE_CAPTURE: f64 = 0.42;
+/// How far the capture point may be from the middle of the feet when a gait ends, and how far before a standing robot steps:
+/// share of the half length of a foot, and share of half the distance across.
+const STOP: [f64; 2] = [0.3, 0.7];
+/// See [`STOP`].
+const BALANCE: [f64; 2] = [0.9, 0.9];
+/// Farthest apart that the feet may be ahead when a gait ends, as a share of the height of the centre of mass.
+const STAGGER: f64 = 0.27;
+/// How much faster a gait slows down than it speeds up.
+const BRAKE: f64 = 3.0;
+/// What is left between the feet when they come closest in a walk sideways, m, beyond the nearest foothold.
+const SPARE: f64 = 0.01;
 /// Fastest change of the height of the centre of mass that is asked, as a share of the height a second.
 const HEIGHT_RATE: f64 = 0.35;
 
@@ -117,8 +122,8 @@ pub struct Gait {
     lift_off: (Vector3<f64>, f64),
     /// Waypoint of the swing foot at phase 1/2, m, odometry frame, for the present step.
     waypoint: Option<Vector3<f64>>,
-    /// Centre of mass across at the beginning of a shift, m from the middle of the feet.
-    sway_from: f64,
+    /// Centre of mass at the beginning of a shift from the middle of the feet, in the heading's axes, m.
+    shift_from: Vector2<f64>,
     reference: JointCommand,
     started: bool,
     counts: Counts,
@@ -171,7 +176,7 @@ impl Gait {
             velocity: Velocity::default(),
             lift_off: (zero, 0.0),
             waypoint: None,
-            sway_from: 0.0,
+            shift_from: Vector2::zeros(),
             started: false,
             counts: Counts::default(),
             view,
@@ -219,6 +224,34 @@ impl Gait {
     #[must_use]
     pub fn footstep(&self) -> Option<Footstep> {
         self.footstep
+    }
+
+    /// Velocity ahead along `heading` (rad, odometry frame) with which the support foot of the step that is `steps` from now
+    /// will stand `way` (m) along it from the present one; `None` when nothing can be told: no step is under way.
+    pub fn velocity_for(&mut self, steps: usize, way: f64, heading: f64) -> Option<f64> {
+        let Mode::Step { support } = self.mode else { return None };
+        if steps == 0 {
+            return None;
+        }
+        let left = (self.settings.gait.step_time - (self.last_time - self.since)).max(0.0);
+        let state = self.pendulum_state(support, heading);
+        let after = |x: f64| self.pendulum.contact_after(&state, left, Vector2::new(x, 0.0), support, steps).x;
+        let (still, slope) = (after(0.0), after(1.0) - after(0.0));
+        (slope.abs() > 1e-6).then(|| (way - still) / slope)
+    }
+
+    /// The present swing, as it would be led through `waypoint` (m, odometry frame).
+    #[must_use]
+    pub fn swing(&self, waypoint: Option<Vector3<f64>>) -> Swing {
+        let gait = &self.settings.gait;
+        Swing {
+            from: self.lift_off.0,
+            waypoint,
+            clearance: gait.clearance,
+            to: self.view.foothold,
+            landing_speed: gait.landing_speed,
+            duration: gait.step_time,
+        }
     }
 
     /// Leads the present swing through `waypoint` (m, odometry frame) at phase 1/2; until the foot comes down.
@@ -302,7 +335,10 @@ impl Gait {
     /// The velocity goes toward what was asked as fast as the limits allow.
     fn approach(&mut self, period: f64) {
         let limits = &self.settings.limits;
-        let toward = |from: f64, to: f64, most: f64| from + (to - from).clamp(-most, most);
+        let toward = |from: f64, to: f64, most: f64| {
+            let most = if to.abs() < from.abs() { BRAKE * most } else { most };
+            from + (to - from).clamp(-most, most)
+        };
         let (now, asked) = (&mut self.velocity, &self.asked);
         if matches!(self.mode, Mode::Step { .. }) {
             now.x = toward(now.x, asked.x, limits.acceleration * period);
@@ -319,17 +355,15 @@ impl Gait {
         let elapsed = state.time - self.since;
         match self.mode {
             Mode::Stand => {
-                let [left, right] = self.view.feet;
-                let middle = 0.5 * (left + right);
-                let capture = self.view.com + self.view.com_velocity / self.pendulum.lambda - middle;
-                let across = Rotation2::new(-self.heading) * capture.xy();
-                if across.norm() > BALANCE_CAPTURE * gait.width {
+                let capture = self.capture();
+                if !self.is_held(capture, BALANCE) {
                     // A push: the foot on the side that it falls to carries, the other steps.
-                    let support = if across.y > 0.0 { Side::Left } else { Side::Right };
+                    let support = if capture.y > 0.0 { Side::Left } else { Side::Right };
                     self.lift(support, state.time);
                 } else if !self.asked.is_zero() {
                     let leftward = self.asked.y > 0.0 || (self.asked.y == 0.0 && self.asked.turn > 0.0);
-                    self.sway_from = (Rotation2::new(-self.heading) * (self.view.com - middle).xy()).y;
+                    let middle = 0.5 * (self.view.feet[0] + self.view.feet[1]);
+                    self.shift_from = Rotation2::new(-self.heading) * (self.view.com - middle).xy();
                     self.mode = Mode::Shift { support: if leftward { Side::Right } else { Side::Left } };
                     self.since = state.time;
                 }
@@ -361,19 +395,32 @@ impl Gait {
         self.view.mode = self.mode;
     }
 
-    /// Whether both feet can keep the body where it is.
+    /// The capture point from the middle of the feet, in the heading's axes, m.
+    fn capture(&self) -> Vector2<f64> {
+        let middle = 0.5 * (self.view.feet[0] + self.view.feet[1]);
+        let point = self.view.com + self.view.com_velocity / self.pendulum.lambda;
+        Rotation2::new(-self.heading) * (point - middle).xy()
+    }
+
+    /// Left foot from the right one, in the heading's axes, m.
+    fn apart(&self) -> Vector2<f64> {
+        Rotation2::new(-self.heading) * (self.view.feet[0] - self.view.feet[1]).xy()
+    }
+
+    /// Whether both feet can hold a body whose capture point is at `capture`, with `shares` of what they have.
+    fn is_held(&self, capture: Vector2<f64>, shares: [f64; 2]) -> bool {
+        let apart = self.apart();
+        // The feet are two parallel lines: their hull is as long as a foot everywhere, about the line that joins the middles.
+        let along = capture.x - capture.y / apart.y.max(1e-3) * apart.x;
+        along.abs() < shares[0] * self.body.feet[0].half_length && capture.y.abs() < 0.5 * shares[1] * apart.y
+    }
+
+    /// Whether the gait may end on both feet.
     fn may_stop(&self) -> bool {
-        if !self.asked.is_zero() || !self.velocity.is_zero() {
-            return false;
-        }
-        let turn = Rotation2::new(-self.heading);
-        let [left, right] = self.view.feet.map(|foot| turn * foot.xy());
-        let capture =
-            turn * (self.view.com + self.view.com_velocity / self.pendulum.lambda).xy() - 0.5 * (left + right);
-        let width = self.settings.gait.width;
-        (left.x - right.x).abs() < STOP_STAGGER * width
-            && capture.x.abs() < STOP_CAPTURE * width
-            && capture.y.abs() < STOP_CAPTURE * width
+        self.asked.is_zero()
+            && self.velocity.is_zero()
+            && self.apart().x.abs() < STAGGER * self.settings.gait.height
+            && self.is_held(self.capture(), STOP)
     }
 
     /// The foot other than `support` leaves the ground.
@@ -401,16 +448,20 @@ impl Gait {
             let outward = if support == Side::Left { 1.0 } else { -1.0 };
             let half = 0.5 * self.pendulum.lambda * self.pendulum.step_time;
             let speed = outward * 0.5 * self.settings.gait.width * self.pendulum.lambda * half.tanh();
-            let across = sway(self.sway_from, speed, self.settings.gait.start_time, time);
+            let duration = self.settings.gait.start_time;
+            let across = sway(self.shift_from.y, speed, duration, time);
+            // Ahead, over the support foot.
+            let to = 0.5 * self.apart().x * outward;
+            let ahead = sway(self.shift_from.x - to, 0.0, duration, time);
             let turn = Rotation2::new(self.heading);
-            let put = |at: &mut Vector3<f64>, across: f64| {
-                let moved = turn * Vector2::new(0.0, across);
+            let put = |at: &mut Vector3<f64>, ahead: f64, across: f64| {
+                let moved = turn * Vector2::new(ahead, across);
                 at.x += moved.x;
                 at.y += moved.y;
             };
-            put(&mut shift.position, across[0]);
-            put(&mut shift.velocity, across[1]);
-            put(&mut shift.acceleration, across[2]);
+            put(&mut shift.position, to + ahead[0], across[0]);
+            put(&mut shift.velocity, ahead[1], across[1]);
+            put(&mut shift.acceleration, ahead[2], across[2]);
         }
         self.view.phase = 0.0;
         Targets {
@@ -429,7 +480,7 @@ impl Gait {
         let gait = &self.settings.gait;
         let (step_time, gain) = (gait.step_time, 1.0 / gait.speed_gain);
         let ([near, far], reach) = (gait.across, gait.reach);
-        let (clearance, landing_speed) = (gait.clearance, gait.landing_speed);
+        let width = gait.width;
         let elapsed = time - self.since;
         let phase = elapsed / step_time;
         let left = (step_time - elapsed).max(0.0);
@@ -438,6 +489,7 @@ impl Gait {
         let heading = self.heading + self.velocity.turn * left;
         let state = self.pendulum_state(support, heading);
         let velocity = Vector2::new(self.velocity.x * gain, self.velocity.y);
+        self.pendulum.width = width.max(velocity.y.abs() * step_time + near + SPARE);
         let mut step = self.pendulum.foothold(&state, left, velocity, self.velocity.turn, swing);
         let outward = if swing == Side::Left { 1.0 } else { -1.0 };
         step.x = step.x.clamp(-reach, reach);
@@ -445,14 +497,6 @@ impl Gait {
         let moved = Rotation2::new(heading) * step;
         let contact = self.view.feet[support as usize];
         let foothold = contact + Vector3::new(moved.x, moved.y, 0.0);
-        let way = Swing {
-            from: self.lift_off.0,
-            waypoint: self.waypoint,
-            clearance,
-            to: foothold,
-            landing_speed,
-            duration: step_time,
-        };
         // The swing foot turns to the heading of the middle of its stance.
         let to = heading + 0.5 * self.velocity.turn * step_time;
         let (turned, rate) = ease(self.lift_off.1, to, phase, step_time);
@@ -460,6 +504,7 @@ impl Gait {
         self.view.momentum = state.momentum;
         self.view.wanted = self.pendulum.wanted(Vector2::new(self.velocity.x, self.velocity.y), support);
         self.view.foothold = foothold;
+        let way = self.swing(self.waypoint);
         let mut carries = [false; 2];
         carries[support as usize] = true;
         Targets {

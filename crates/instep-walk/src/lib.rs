@@ -4,6 +4,7 @@
 //! - [`StateEstimate`]: what walking knows of its robot, the seam between estimator and controller.
 //! - [`gait`]: stands, starts, steps, stops; [`footsteps`] chooses where to, [`swing`] how, [`whole_body`] with which torques,
 //!   by the quadratic program of [`instep_qp`].
+//! - [`plmk`]: when a kick is locked onto a step, and where it strikes; [`in_gait`] walks up and has it done.
 //! - [`settings`]: all numbers, with defaults that follow from the robot's size.
 //!
 //! Maths only: no simulator, no clock, no camera, no field. A tick allocates nothing.
@@ -12,7 +13,9 @@ pub mod approach;
 mod error;
 pub mod footsteps;
 pub mod gait;
+pub mod in_gait;
 pub mod odometry;
+pub mod plmk;
 pub mod settings;
 mod state;
 pub mod swing;

@@ -215,7 +215,7 @@ impl WalkSettings {
                 earliest: 0.7,
                 latest: 0.11 * time,
                 reach: 0.92 * height,
-                across: [0.5 * width, 0.78 * height],
+                across: [0.55 * width, 0.78 * height],
                 start_time: 3.0 * time,
                 lean: 0.03,
             },

@@ -34,6 +34,8 @@ pub struct FootModel {
     pub contacts: Vec<usize>,
     /// The middle of the contact points on the ground, in the foot's frame.
     pub reference: LinkPoint,
+    /// Half the distance between its foremost and its hindmost contact point, m.
+    pub half_length: f64,
     /// Whether it has an ankle roll: else it rolls freely about its line.
     pub rolls: bool,
 }
@@ -48,7 +50,11 @@ impl FootModel {
         let sum: Vector3<f64> = contacts.iter().map(|&c| ground_point(robot, &data, c)).sum();
         let middle = sum / contacts.len().max(1) as f64;
         let local = data.link_matrix(leg.foot).transpose() * (middle - data.link_position(leg.foot));
-        Self { side, contacts, reference: LinkPoint { link: leg.foot, point: local }, rolls: leg.ankle_roll.is_some() }
+        let ahead = data.link_matrix(leg.foot).column(0).into_owned();
+        let half_length =
+            contacts.iter().map(|&c| (ground_point(robot, &data, c) - middle).dot(&ahead).abs()).fold(0.0, f64::max);
+        let reference = LinkPoint { link: leg.foot, point: local };
+        Self { side, contacts, reference, half_length, rolls: leg.ankle_roll.is_some() }
     }
 }
 
