@@ -567,6 +567,7 @@ fn is_reach(refusal: &Refusal) -> bool {
         Refusal::BallBehind { .. }
         | Refusal::BallUnderRobot { .. }
         | Refusal::TooFar { .. }
+        | Refusal::BallRolls { .. }
         | Refusal::Unreachable { .. }
         | Refusal::SelfCollision { .. }
         | Refusal::TooFast { .. }
