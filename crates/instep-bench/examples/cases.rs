@@ -18,10 +18,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut ticks = Vec::new();
     let (mut hits, mut upright, mut accepted) = (0, 0, 0);
     for (i, case) in scenario.cases(&subject.size, seed, count).into_iter().enumerate() {
-        let mut engine = subject.engine(&text(0, "adaptive"))?;
         let mut world = world(&subject, &scenario, &case)?;
         let start = instep_bench::cpu::thread_seconds();
-        let (outcome, plan, trial) = run_case(&subject, &case, engine.as_mut(), &mut world, &mut ticks)?;
+        let (outcome, plan, trial) = run_case(&subject, &text(0, "adaptive"), &case, &mut world, &mut ticks)?;
         let cpu = instep_bench::cpu::thread_seconds() - start;
         let asked = format!(
             "{i:3} ball ({:+.3} {:+.3}) {:+5.0} deg {:.2} m/s plan {:5.1} ms",

@@ -34,7 +34,7 @@ fn a_greedy_controller_gets_no_more_than_the_motors_have() {
         ball: BallState::at_rest([5.0, 0.0, 0.11]),
         direction: 0.0,
     };
-    let trial = run(&robot, &settings, &mut Greedy).unwrap();
+    let trial = run(&robot, &settings, &mut Greedy, &mut Greedy).unwrap();
     for group in &trial.groups {
         assert!(group.torque <= group.torque_limit * (1.0 + 1e-12), "{group:?}");
     }
