@@ -2,9 +2,9 @@
 //!
 //! Definitions (facts/physics-of-the-kick.md). A touch starts with the first contact and ends with the last one before a
 //! pause of [`PAUSE`]. Its normal n is the direction of the impulse on the ball; its striking point is that of the largest
-//! force, fixed to the link that gave it. Restitution is (ball's speed after - point's speed after) / (point's speed before
-//! - ball's speed before) along n; effective mass is 1 / (n^T J M^-1 J^T n) of the free robot as its model says. Energies are
-//! those of the robot that is in the world, whose masses may differ from its model's.
+//! force, fixed to the link that gave it. Along n, restitution is what ball and point part at over what they approached each
+//! other at; effective mass is 1 / (n^T J M^-1 J^T n) of the free robot as its model says. Energies are those of the robot that
+//! is in the world, whose masses may differ from its model's.
 
 use instep_robot::{LinkPoint, RobotData};
 use nalgebra::Vector3;

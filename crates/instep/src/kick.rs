@@ -297,7 +297,7 @@ impl Tried {
     /// Writes report and recording, both or neither.
     fn write(&self) -> Result<(), Failure> {
         let mut batch = files::Batch::default();
-        page::page(self).save(batch.stage(&self.report)?)?;
+        page(self).save(batch.stage(&self.report)?)?;
         recording::recording(self)?.save(batch.stage(&self.recording)?)?;
         batch.commit()
     }

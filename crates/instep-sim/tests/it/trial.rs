@@ -104,9 +104,9 @@ fn faults(touches: &[Impact], rerun: Option<Outcome>) -> Vec<Fault> {
 #[test]
 fn each_test_of_the_audit_finds_its_fault() {
     let good = good_touch();
-    assert_eq!(faults(&[good.clone()], Some(GOOD)), []);
+    assert_eq!(faults(&[good_touch()], Some(GOOD)), []);
     let unfinished = Evidence {
-        touches: &[good.clone()],
+        touches: &[good_touch()],
         finished: false,
         ball_radius: 0.11,
         outcome: GOOD,
