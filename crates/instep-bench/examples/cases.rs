@@ -39,7 +39,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 let deg = |v: Option<f64>| v.map_or(f64::NAN, f64::to_degrees);
                 let by = trial.impact.as_ref().map_or("-", |impact| impact.link.as_str());
                 println!(
-                    "{asked} {} {} moved {:.2?} off {:+6.1} deg speed {:.2} g {:.3} stated {:4.1} ground {} broke {:?} beyond {:?} by {by} at {:.2} cpu {cpu:.1}",
+                    "{asked} {} {} moved {:.2?} off {:+6.1} deg speed {:.2} g {:.3} stated {:4.1} ground {} broke {:?} beyond {:?} by {by} at {:.2} cpu {cpu:.1} {}",
                     if k.hit { "hit " } else { "MISS" },
                     if k.upright { "up  " } else { "FELL" },
                     case.ball_moved.map(|(_, by)| by),
@@ -55,6 +55,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                         .map(|v| (&v.joint, v.quantity, v.peak / v.limit, v.time))
                         .collect::<Vec<_>>(),
                     k.contact.unwrap_or(f64::NAN),
+                    trial.audit.reason(),
                 );
             }
             (outcome, _) => {

@@ -29,4 +29,4 @@ mod world;
 
 pub use error::SimError;
 pub use rate::{NamedRate, Rate};
-pub use world::{BallState, World};
+pub use world::{BallState, Steps, World};

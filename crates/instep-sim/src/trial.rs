@@ -13,7 +13,7 @@ use crate::audit::{Audit, Evidence, Outcome, RERUN_FACTOR, hardest};
 use crate::impact::{Impact, ImpactWatch};
 use crate::sensors::{SensorSuite, orientation};
 use crate::settings::WorldSettings;
-use crate::world::{BallState, JointPeak, World};
+use crate::world::{BallState, JointPeak, Steps, World};
 
 /// Tilt of the base link beyond which the robot counts as fallen, rad.
 pub const FALLEN_TILT: f64 = 1.05;
@@ -105,6 +105,8 @@ pub struct Record {
     pub contact_forces: Vec<f64>,
     /// Ball.
     pub ball: Vec<BallState>,
+    /// Every physics step, where the world was told to keep them.
+    pub steps: Option<Steps>,
 }
 
 /// What came of a kick.
@@ -332,6 +334,9 @@ fn follow(
         if let Some(record) = record.as_deref_mut() {
             record.push(world);
         }
+    }
+    if let Some(record) = record {
+        record.steps = world.take_steps();
     }
     let (finished, ball_end, peaks) = (watch.is_free(world.time()), world.ball().position, world.peaks().to_vec());
     Ok(Course { touches: watch.touches(world, data), finished, fell_at: fall.fell_at, peaks, ball_end })

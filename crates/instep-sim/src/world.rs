@@ -85,6 +85,19 @@ pub struct World {
     push: Vector3<f64>,
     push_work: f64,
     near: bool,
+    steps: Option<Steps>,
+}
+
+/// Every physics step of a trial, for a program of its own to do again: `tools/replay.py`.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Steps {
+    /// For each step its length (s), positions and speeds of the whole world before it, forces on its degrees of freedom, and
+    /// force and moment on the base link and on the ball (N, N m, world frame).
+    pub rows: Vec<f64>,
+    /// Positions and speeds after the last one.
+    pub end: Vec<f64>,
+    /// Numbers in a row.
+    pub width: usize,
 }
 
 /// A contact of the ball with the robot.
@@ -173,6 +186,7 @@ impl World {
             push: Vector3::zeros(),
             push_work: 0.0,
             near: false,
+            steps: None,
         };
         let stand = world.robot.stand.clone();
         let still = vec![0.0; world.robot.nv()];
@@ -214,7 +228,22 @@ impl World {
         self.push = Vector3::zeros();
         self.push_work = 0.0;
         self.near = self.is_near();
+        if let Some(steps) = &mut self.steps {
+            *steps = Steps::default();
+        }
         Ok(())
+    }
+
+    /// Keeps every physics step from the next reset on, until they are taken.
+    pub fn keep_steps(&mut self) {
+        self.steps = Some(Steps::default());
+    }
+
+    /// The steps since the last reset, where they were kept; no more are.
+    pub fn take_steps(&mut self) -> Option<Steps> {
+        let mut steps = self.steps.take()?;
+        steps.end = [self.data.qpos(), self.data.qvel()].concat();
+        Some(steps)
     }
 
     /// Advances one tick under `command`, in far steps, or near ones while the ball is near; tells `watch` of every step.
@@ -303,6 +332,18 @@ impl World {
         }
         if !torque_sum.is_finite() {
             return Err(SimError::Diverged { time: self.time, what: "a joint torque" });
+        }
+        if let Some(mut steps) = self.steps.take() {
+            let before = steps.rows.len();
+            steps.rows.push(dt);
+            for part in [self.data.qpos(), self.data.qvel(), self.data.qfrc_applied()] {
+                steps.rows.extend_from_slice(part);
+            }
+            for body in [self.robot.base, self.ball_body] {
+                steps.rows.extend_from_slice(&self.data.xfrc_applied()[body]);
+            }
+            steps.width = steps.rows.len() - before;
+            self.steps = Some(steps);
         }
         self.data.model_opt_mut().timestep = dt;
         self.data.step();
@@ -537,4 +578,39 @@ fn contact_force(data: &MjData<Box<MjModel>>, i: usize) -> Vector3<f64> {
     let frame = &data.contact()[i].frame;
     let axis = |k: usize| Vector3::new(frame[3 * k], frame[3 * k + 1], frame[3 * k + 2]);
     axis(0) * local[0] + axis(1) * local[1] + axis(2) * local[2]
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+mod tests {
+    use super::*;
+
+    /// In the air, where nothing else does work, what the motors do is what robot and ball gain of energy.
+    #[test]
+    fn the_motors_work_is_the_energy_that_a_floating_robot_gains() {
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots/prestoe");
+        let robot = Arc::new(Robot::load(&folder).unwrap());
+        let mut world = World::new(Arc::clone(&robot), &WorldSettings::default()).unwrap();
+        let mut q = robot.stand.clone();
+        q[2] += 3.0;
+        world.reset(&q, &vec![0.0; robot.nv()], &BallState::at_rest([9.0, 0.0, 0.11])).unwrap();
+        let still = world.ball();
+        let [kinetic, potential] = world.energy(&q, &vec![0.0; robot.nv()], &still);
+        let before = kinetic + potential;
+        world.reset(&q, &vec![0.0; robot.nv()], &still).unwrap();
+        let mut command = JointCommand::zeros(robot.joints.len());
+        command.positions.copy_from_slice(&q[7..]);
+        // Both arms and one leg swing out.
+        for name in ["left_elbow", "right_elbow", "left_hip_pitch"] {
+            command.positions[robot.joint_index(name).unwrap()] -= 0.8;
+        }
+        for _ in 0..60 {
+            world.advance(&command, None).unwrap();
+        }
+        let (q, v, work) = (world.q().to_vec(), world.v().to_vec(), world.motor_work());
+        let [kinetic, potential] = world.energy(&q, &v, &still);
+        let gained = kinetic + potential - before;
+        assert!(work > 1.0, "{work} J");
+        assert!((gained / work - 1.0).abs() < 0.05, "{gained} J gained, {work} J of work");
+    }
 }

@@ -3,6 +3,7 @@
 mod engine;
 mod page;
 mod recording;
+mod steps;
 mod summary;
 
 pub(crate) use page::page;
@@ -18,11 +19,11 @@ use instep_motion::phase::Side;
 use instep_motion::reference::{Reference, ReferenceKind};
 use instep_robot::Robot;
 use instep_robot::control::Controller;
-use instep_sim::BallState;
 use instep_sim::audit::Rerun;
 use instep_sim::impact::Impact;
 use instep_sim::settings::{Change, WorldSettings};
 use instep_sim::trial::{self, Trial, TrialSettings};
+use instep_sim::{BallState, World};
 use serde::Serialize;
 
 use crate::failure::Failure;
@@ -75,6 +76,10 @@ pub(crate) struct Kick {
     /// With --engine: a file of requests (a JSON array, or one JSON object a line) in place of --ball; writes no report
     #[arg(long, value_name = "FILE", requires = "engine", conflicts_with_all = ["ball", "direction", "speed"])]
     requests: Option<PathBuf>,
+    /// Also writes model.mjb, steps.json and steps.f64 into this folder: every physics step of one kick, which tools/replay.py
+    /// does again in MuJoCo's own Python
+    #[arg(long, value_name = "FOLDER", conflicts_with = "requests")]
+    steps: Option<PathBuf>,
     /// Constants of the world, as TOML; what is absent keeps its default
     #[arg(long, value_name = "FILE")]
     world: Option<PathBuf>,
@@ -173,7 +178,14 @@ impl Kick {
             ball: BallState::at_rest([x, y, world.ball.radius]),
             direction: 0.0,
         };
-        let trial = trial::run(&robot, &settings, controller.as_mut(), twin.as_mut())?;
+        let mut room = World::new(Arc::clone(&robot), &settings.world)?;
+        if let Some(folder) = &self.steps {
+            steps::prepare(folder, &mut room)?;
+        }
+        let trial = trial::run_in(&mut room, &settings, controller.as_mut(), twin.as_mut())?;
+        if let Some(folder) = &self.steps {
+            steps::write(folder, &mut room, &trial)?;
+        }
         let followed = Arc::new(Followed { reference, file: reference_file, policy, start });
         let source = Source::Followed(Arc::clone(&followed));
         let world_changes = world.changes(&default);
@@ -241,7 +253,8 @@ impl Kick {
             (None, ball) => vec![self.request(ball, subject.engine(engine)?.own_start().map(|start| start.request))?],
         };
         let world = world_settings(self.world.as_deref(), &subject.world())?;
-        engine::run(&subject, engine, &requests, world, self.seed, &self.out, output)
+        let folders = engine::Folders { out: &self.out, steps: self.steps.as_deref() };
+        engine::run(&subject, engine, &requests, world, self.seed, folders, output)
     }
 }
 

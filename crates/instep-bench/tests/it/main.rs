@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 mod adaptive;
+mod follow;
 
 use std::path::{Path, PathBuf};
 

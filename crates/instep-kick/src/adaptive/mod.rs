@@ -65,8 +65,8 @@ pub fn grid_hash(robot: &Robot, settings: &AdaptiveSettings) -> u64 {
     let text = format!(
         "{} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?}",
         robot.name,
-        robot.joints,
-        robot.legs,
+        robot.joints.iter().map(|j| (&j.name, j.range, j.torque, j.speed, j.corner, j.kp, j.kd)).collect::<Vec<_>>(),
+        robot.legs.iter().map(|leg| (leg.thigh, leg.shank, leg.foot, &leg.sole, &leg.strike)).collect::<Vec<_>>(),
         robot.contacts,
         robot.self_collision,
         robot.stand,

@@ -262,3 +262,57 @@ fn a_push_moves_the_robot_and_its_work_is_counted() {
     assert!(way > 0.9 * lump, "{way} m");
     assert!(work > 0.9 * force * lump && work < 1.5 * force * way.max(lump), "{work} J for {way} m");
 }
+
+/// Positive is to the left, from where it was wanted.
+#[test]
+fn the_direction_error_is_from_the_wanted_to_the_real_direction() {
+    let robot = robot("prestoe");
+    let kick = |direction: f64| {
+        let ball = BallState { velocity: [-3.0, 1.0, 0.0], ..BallState::at_rest([0.35, -0.18, 0.11]) };
+        let settings = TrialSettings {
+            world: WorldSettings::default(),
+            seed: 1,
+            duration: 0.4,
+            control_period: 0.002,
+            q: robot.stand.clone(),
+            v: vec![0.0; robot.nv()],
+            ball,
+            direction,
+        };
+        let hold = || Hold(robot.stand[7..].to_vec());
+        run(&robot, &settings, &mut hold(), &mut hold()).unwrap()
+    };
+    let trial = kick(0.0);
+    let [x, y, z] = trial.touches.last().expect("the foot is in its way").ball_velocity;
+    assert!(y.abs() > 0.2, "the ball goes aside: {y} m/s");
+    assert!((trial.direction_error.unwrap() - y.atan2(x)).abs() < 1e-12);
+    assert!((trial.launch_angle.unwrap() - z.atan2(x.hypot(y))).abs() < 1e-12);
+    // Wanted a little to the left, the same ball went farther to the right of it.
+    assert!((kick(0.3).direction_error.unwrap() - (y.atan2(x) - 0.3)).abs() < 1e-12);
+}
+
+#[test]
+fn a_push_of_a_trial_is_a_push_in_the_world() {
+    let robot = robot("prestoe");
+    let settings = TrialSettings {
+        world: WorldSettings::default(),
+        seed: 1,
+        duration: 0.3,
+        control_period: 0.002,
+        q: robot.stand.clone(),
+        v: vec![0.0; robot.nv()],
+        ball: BallState::at_rest([5.0, 0.0, 0.11]),
+        direction: 0.0,
+    };
+    let mut world = World::new(robot.clone(), &settings.world).unwrap();
+    let mut speed_after = |force: f64| {
+        let push = Disturbance::Push { time: 0.1, duration: 0.05, force: [0.0, force, 0.0] };
+        let hold = || Hold(robot.stand[7..].to_vec());
+        let trial = run_disturbed(&mut world, &settings, &[push], &mut hold(), &mut hold()).unwrap();
+        trial.record.row(&trial.record.v, 75)[1]
+    };
+    // 0.3 m/s for the whole robot as one lump; the feet stand, so the base has less, or more, but that way.
+    let force = 0.3 * robot.mass() / 0.05;
+    assert!(speed_after(0.0).abs() < 0.02);
+    assert!(speed_after(force) > 0.1 && speed_after(-force) < -0.1);
+}

@@ -14,7 +14,7 @@ use instep_sim::settings::{Change, ModelError, WorldSettings};
 use instep_sim::start::StartErrors;
 use serde::Serialize;
 
-use super::{Source, Tried, summary};
+use super::{Source, Tried, steps, summary};
 use crate::failure::Failure;
 use crate::files;
 use crate::output::Output;
@@ -47,7 +47,16 @@ struct Refused {
     message: String,
 }
 
-/// Runs `requests` one after the other, each from where the engine starts; a single one is shown in a report under `out`.
+/// Where files go.
+pub(super) struct Folders<'a> {
+    /// Report and recording.
+    pub(super) out: &'a Path,
+    /// Physics steps.
+    pub(super) steps: Option<&'a Path>,
+}
+
+/// Runs `requests` one after the other, each from where the engine starts; a single one is shown in a report under `out`, and its
+/// physics steps are kept where that is asked for.
 ///
 /// # Errors
 /// When engine or world cannot be made, or a simulation diverges. A refusal is an answer.
@@ -57,9 +66,10 @@ pub(super) fn run(
     requests: &[KickRequest],
     settings: WorldSettings,
     seed: u64,
-    out: &Path,
+    folders: Folders,
     output: &Output,
 ) -> Result<ExitCode, Failure> {
+    let Folders { out, steps: kept } = folders;
     let (report, recording) = (out.join("report.html"), out.join("kick.mcap"));
     if requests.len() == 1 {
         for file in [&report, &recording] {
@@ -68,6 +78,9 @@ pub(super) fn run(
     }
     let world_changes = settings.changes(&subject.world());
     let mut world = World::new(subject.robot.clone(), &settings)?;
+    if let Some(folder) = kept {
+        steps::prepare(folder, &mut world)?;
+    }
     let mut answers = Vec::with_capacity(requests.len());
     let mut shown = None;
     for request in requests {
@@ -88,6 +101,9 @@ pub(super) fn run(
         let refused = outcome.as_ref().err().map(|r| Refused { cause: r.name(), message: r.explain(&subject.robot) });
         let kicked = outcome.ok();
         let direction_error_deg = kicked.and_then(|k| k.direction_error).map(f64::to_degrees);
+        if let (Some(folder), Some(ran)) = (kept, &ran) {
+            steps::write(folder, &mut world, &ran.trial)?;
+        }
         let audit = ran.as_ref().map(|ran| ran.trial.audit.clone());
         let touches = ran.as_ref().map_or(0, |ran| ran.trial.touches.len());
         let ran = ran.filter(|_| requests.len() == 1);

@@ -1,0 +1,47 @@
+//! A robot that tips toward its swing foot after the contact puts that foot down at once.
+
+use std::sync::Arc;
+
+use instep_kick::adaptive::AdaptiveKick;
+use instep_kick::{KickEngine, KickStatus, Phase};
+use instep_motion::phase::Side;
+use instep_robot::control::{BallObservation, JointCommand};
+
+use crate::rig::{engine, request, robot, standing};
+
+/// How long (s) it takes from the first instant of moving the swing foot back until `engine` stands on both feet again, when its
+/// sensors tell a rate (rad/s) toward that foot while it moves back.
+fn coming_back(engine: &mut dyn KickEngine, name: &str, rate: f64) -> f64 {
+    let (robot, request) = (robot(name), request(name));
+    let mut sensors = standing(&robot);
+    let plan = engine.plan(&request, &sensors).unwrap();
+    let [x, y] = request.ball;
+    let mut command = JointCommand::zeros(robot.joints.len());
+    let (period, mut time, mut back) = (engine.control_period(), 0.0, 0.0);
+    let toward = if plan.foot == Side::Left { -rate } else { rate };
+    while engine.progress().status == KickStatus::Running && time < 3.0 * plan.duration {
+        let moves_back = engine.progress().phase == Phase::MoveBack;
+        sensors.time = time;
+        sensors.ball = Some(BallObservation { time, position: [x, y, 0.05] });
+        sensors.gyro = [if moves_back { toward } else { 0.0 }, 0.0, 0.0];
+        engine.tick(&sensors, &mut command);
+        sensors.joint_positions.copy_from_slice(&command.positions);
+        back += if moves_back || back > 0.0 { period } else { 0.0 };
+        time += period;
+    }
+    back
+}
+
+#[test]
+fn a_lean_toward_the_swing_foot_puts_it_down_at_once() {
+    let makes: [fn() -> Box<dyn KickEngine>; 2] =
+        [|| Box::new(engine("nao")), || Box::new(AdaptiveKick::load(Arc::clone(&robot("nao"))).unwrap())];
+    for make in makes {
+        let calm = coming_back(make().as_mut(), "nao", 0.0);
+        let tipping = coming_back(make().as_mut(), "nao", 3.0);
+        let away = coming_back(make().as_mut(), "nao", -3.0);
+        let name = make().name();
+        assert!(tipping < calm - 0.2, "{name}: {tipping} s in place of {calm} s");
+        assert!((away - calm).abs() < 0.02, "{name}: {away} s, tipping to the other side");
+    }
+}
