@@ -187,7 +187,8 @@ impl Audit {
         }
         let own = evidence.outcome;
         let (fine, step) = evidence.rerun.map_or((None, 0.0), |(outcome, step)| (Some(outcome), step.far));
-        let [tight, loose] = [0, 1].map(|i| rerun_faults(&own, fine.as_ref(), SPEED_CHANGE[i], DIRECTION_CHANGE_DEG[i]));
+        let [tight, loose] =
+            [0, 1].map(|i| rerun_faults(&own, fine.as_ref(), SPEED_CHANGE[i], DIRECTION_CHANGE_DEG[i]));
         let converged = tight.is_empty();
         faults.extend(loose);
         let rerun = fine.map(|fine| Rerun {
