@@ -93,12 +93,17 @@ fn good_touch() -> Impact {
 
 const GOOD: Outcome = Outcome { ball_speed: Some(10.0), direction_error: Some(0.02), upright: true };
 
-/// The faults of a kick with these touches and this re-run.
-fn faults(touches: &[Impact], rerun: Option<Outcome>) -> Vec<Fault> {
+/// The audit of a kick with these touches and this re-run.
+fn audit(touches: &[Impact], rerun: Option<Outcome>) -> Audit {
     let rerun = rerun.map(|outcome| (outcome, Step::default().finer(4.0)));
     let audit = Audit::new(&Evidence { touches, finished: true, ball_radius: 0.11, outcome: GOOD, rerun });
     assert_eq!(audit.is_valid(), audit.faults.is_empty());
-    audit.faults
+    audit
+}
+
+/// Its faults.
+fn faults(touches: &[Impact], rerun: Option<Outcome>) -> Vec<Fault> {
+    audit(touches, rerun).faults
 }
 
 #[test]
@@ -146,16 +151,24 @@ fn each_test_of_the_audit_finds_its_fault() {
 fn a_kick_that_changes_with_the_step_is_invalid() {
     let touches = [good_touch()];
     let again = |outcome: Outcome| faults(&touches, Some(outcome));
-    assert_eq!(again(Outcome { ball_speed: Some(9.81), direction_error: Some(0.037), ..GOOD }), []);
-    assert_eq!(again(Outcome { ball_speed: Some(10.19), direction_error: Some(0.003), ..GOOD }), []);
-    assert!(matches!(again(Outcome { ball_speed: Some(9.79), ..GOOD })[..], [Fault::StepSpeed { .. }]));
-    assert!(matches!(again(Outcome { ball_speed: Some(10.21), ..GOOD })[..], [Fault::StepSpeed { .. }]));
+    let speed = |speed: f64| Outcome { ball_speed: Some(speed), ..GOOD };
+    let turned = |degrees: f64| Outcome { direction_error: Some(0.02 + degrees.to_radians()), ..GOOD };
+    assert_eq!(again(Outcome { ball_speed: Some(9.51), ..turned(2.99) }), []);
+    assert_eq!(again(Outcome { ball_speed: Some(10.49), ..turned(-2.99) }), []);
+    assert!(matches!(again(speed(9.49))[..], [Fault::StepSpeed { .. }]));
+    assert!(matches!(again(speed(10.51))[..], [Fault::StepSpeed { .. }]));
     assert!(matches!(
         again(Outcome { ball_speed: None, direction_error: None, ..GOOD })[..],
         [Fault::StepSpeed { .. }]
     ));
-    assert!(matches!(again(Outcome { direction_error: Some(0.038), ..GOOD })[..], [Fault::StepDirection { .. }]));
-    assert!(matches!(again(Outcome { direction_error: Some(0.002), ..GOOD })[..], [Fault::StepDirection { .. }]));
+    assert!(matches!(again(turned(3.01))[..], [Fault::StepDirection { .. }]));
+    assert!(matches!(again(turned(-3.01))[..], [Fault::StepDirection { .. }]));
+    // A kick has converged within narrower bounds than those within which it is believed.
+    let converged = |outcome: Outcome| audit(&touches, Some(outcome)).converged;
+    assert!(converged(speed(9.81)) && converged(speed(10.19)) && converged(turned(0.99)) && converged(turned(-0.99)));
+    assert!(!converged(speed(9.79)) && !converged(speed(10.21)));
+    assert!(!converged(turned(1.01)) && !converged(turned(-1.01)));
+    assert!(!converged(Outcome { upright: false, ..GOOD }));
     assert!(matches!(
         again(Outcome { upright: false, ..GOOD })[..],
         [Fault::StepBalance { coarse: true, fine: false }]

@@ -371,12 +371,13 @@ fn notes(tried: &Tried) -> Vec<String> {
             "Time step {} ms, {} ms while the ball is near the robot. Ball speed and direction are those after the last touch. The \
              audit: at every touch kinetic energy may not grow by more than motors, pushes and gravity gave, effective restitution \
              is at most {}, ball and robot are at most half a ball's radius and {} ms in one another; and the whole kick, run again \
-             at a quarter of the step, may change the ball's speed by {} % and its direction by 1\u{b0} at most.",
+             at a quarter of the step, may change the ball's speed by {} % and its direction by {}\u{b0} at most.",
             step.far * 1e3,
             step.near * 1e3,
             instep_sim::audit::MAX_RESTITUTION,
             instep_sim::audit::MAX_CONTACT * 1e3,
-            instep_sim::audit::MAX_SPEED_CHANGE * 100.0,
+            instep_sim::audit::SPEED_CHANGE[1] * 100.0,
+            instep_sim::audit::DIRECTION_CHANGE_DEG[1],
         ),
         "A fall is a base tilted by more than 60\u{b0} or at less than half its standing height, or any part but a \
          foot on the ground."
