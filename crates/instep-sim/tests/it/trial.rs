@@ -163,6 +163,15 @@ fn a_kick_that_changes_with_the_step_is_invalid() {
     ));
     assert!(matches!(again(turned(3.01))[..], [Fault::StepDirection { .. }]));
     assert!(matches!(again(turned(-3.01))[..], [Fault::StepDirection { .. }]));
+    // A slow ball's few centimetres per second are believed, but not a ball that the re-run misses.
+    let slow = |fine: Option<f64>| {
+        let outcome = |ball_speed: Option<f64>| Outcome { ball_speed, ..GOOD };
+        let rerun = Some((outcome(fine), Step::default()));
+        let (touches, outcome) = (&touches[..], outcome(Some(0.4)));
+        Audit::new(&Evidence { touches, finished: true, ball_radius: 0.11, outcome, rerun })
+    };
+    assert!(slow(Some(0.429)).is_valid() && !slow(Some(0.429)).converged);
+    assert!(!slow(Some(0.431)).is_valid() && !slow(None).is_valid());
     // A kick has converged within narrower bounds than those within which it is believed.
     let converged = |outcome: Outcome| audit(&touches, Some(outcome)).converged;
     assert!(converged(speed(9.81)) && converged(speed(10.19)) && converged(turned(0.99)) && converged(turned(-0.99)));
