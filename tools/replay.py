@@ -49,6 +49,8 @@ def main(folder):
     mujoco.mj_forward(model, data)
     worst_state = worst_torque = worst_law = worst_air = 0.0
     inverse = mujoco.MjData(model)
+    # The inverse of the discrete step: from the two speeds that it led from and to.
+    model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_INVDISCRETE
     for i in range(count):
         free = slice(nq - 7, nq)
         if np.abs(data.qpos[free] - qpos[i][free]).max() > 1e-3:
@@ -62,7 +64,7 @@ def main(folder):
         mujoco.mj_step(model, data)
 
         # Inverse: what forces does this acceleration need? Those that are not contact, friction or passive are applied.
-        inverse.qpos[:], inverse.qvel[:], inverse.qacc[:] = qpos[i], qvel[i], data.qacc
+        inverse.qpos[:], inverse.qvel[:], inverse.qacc[:] = qpos[i], qvel[i], (data.qvel - qvel[i]) / dt[i]
         mujoco.mj_inverse(model, inverse)
         needed = inverse.qfrc_inverse.copy()
         for body in (base, ball):

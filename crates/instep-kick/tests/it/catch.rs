@@ -10,7 +10,7 @@ use instep_robot::control::{BallObservation, JointCommand};
 use crate::rig::{engine, request, robot, standing};
 
 /// How long (s) it takes from the first instant of moving the swing foot back until `engine` stands on both feet again, when its
-/// sensors tell a rate (rad/s) toward that foot while it moves back.
+/// sensors tell a rate (rad/s) toward that foot.
 fn coming_back(engine: &mut dyn KickEngine, name: &str, rate: f64) -> f64 {
     let (robot, request) = (robot(name), request(name));
     let mut sensors = standing(&robot);
@@ -23,7 +23,7 @@ fn coming_back(engine: &mut dyn KickEngine, name: &str, rate: f64) -> f64 {
         let moves_back = engine.progress().phase == Phase::MoveBack;
         sensors.time = time;
         sensors.ball = Some(BallObservation { time, position: [x, y, 0.05] });
-        sensors.gyro = [if moves_back { toward } else { 0.0 }, 0.0, 0.0];
+        sensors.gyro = [toward, 0.0, 0.0];
         engine.tick(&sensors, &mut command);
         sensors.joint_positions.copy_from_slice(&command.positions);
         back += if moves_back || back > 0.0 { period } else { 0.0 };
@@ -37,7 +37,7 @@ fn a_lean_toward_the_swing_foot_puts_it_down_at_once() {
     let makes: [fn() -> Box<dyn KickEngine>; 2] =
         [|| Box::new(engine("nao")), || Box::new(AdaptiveKick::load(Arc::clone(&robot("nao"))).unwrap())];
     for make in makes {
-        // NAO stands rolled over its support foot; these sensors do not tell so, and a robot that they call upright leans already.
+        // NAO stands rolled over its support foot, which these sensors do not tell: without a rate it leans already.
         let tipping = coming_back(make().as_mut(), "nao", 3.0);
         let away = coming_back(make().as_mut(), "nao", -3.0);
         let name = make().name();
