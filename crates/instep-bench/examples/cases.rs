@@ -18,10 +18,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut ticks = Vec::new();
     let (mut hits, mut upright, mut accepted) = (0, 0, 0);
     for (i, case) in scenario.cases(&subject.size, seed, count).into_iter().enumerate() {
-        let mut engine = subject.engine(&text(0, "adaptive"))?;
         let mut world = world(&subject, &scenario, &case)?;
         let start = instep_bench::cpu::thread_seconds();
-        let (outcome, plan, trial) = run_case(&subject, &case, engine.as_mut(), &mut world, &mut ticks)?;
+        let (outcome, plan, trial) = run_case(&subject, &text(0, "adaptive"), &case, &mut world, &mut ticks)?;
         let cpu = instep_bench::cpu::thread_seconds() - start;
         let asked = format!(
             "{i:3} ball ({:+.3} {:+.3}) {:+5.0} deg {:.2} m/s plan {:5.1} ms",
@@ -40,7 +39,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 let deg = |v: Option<f64>| v.map_or(f64::NAN, f64::to_degrees);
                 let by = trial.impact.as_ref().map_or("-", |impact| impact.link.as_str());
                 println!(
-                    "{asked} {} {} moved {:.2?} off {:+6.1} deg speed {:.2} g {:.3} stated {:4.1} ground {} broke {:?} beyond {:?} by {by} at {:.2} cpu {cpu:.1}",
+                    "{asked} {} {} moved {:.2?} off {:+6.1} deg speed {:.2} g {:.3} stated {:4.1} ground {} broke {:?} beyond {:?} by {by} at {:.2} cpu {cpu:.1} {}",
                     if k.hit { "hit " } else { "MISS" },
                     if k.upright { "up  " } else { "FELL" },
                     case.ball_moved.map(|(_, by)| by),
@@ -56,6 +55,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                         .map(|v| (&v.joint, v.quantity, v.peak / v.limit, v.time))
                         .collect::<Vec<_>>(),
                     k.contact.unwrap_or(f64::NAN),
+                    trial.audit.reason(),
                 );
             }
             (outcome, _) => {

@@ -3,15 +3,18 @@
 //! The engine sees the request and the sensors; the world and its truth stay here. The time that plans and ticks take on
 //! a core is measured here too, and is the only thing in a result that differs from run to run.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use instep_kick::{BreakOff, KickEngine, KickPlan, Phase, Refusal};
+use instep_kick::{BreakOff, KickEngine, KickPlan, KickRequest, Phase, Refusal};
 use instep_motion::phase::Side;
 use instep_robot::Robot;
 use instep_robot::control::{Controller, JointCommand, Sensors};
 use instep_sim::sensors::SensorSuite;
 use instep_sim::trial::{Disturbance, Trial, TrialSettings, run_disturbed};
 use instep_sim::{BallState, World};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
 use crate::BenchError;
@@ -23,6 +26,12 @@ use crate::scenario::{Case, Scenario};
 const AFTER: f64 = 0.8;
 /// A ball that leaves slower than this share of the asked speed was not hit.
 const HIT: f64 = 0.3;
+/// A kick is delivered when the ball has this share of the asked speed or more,
+const DELIVERED_SPEED: f64 = 0.8;
+/// and goes at most this far off the asked direction, rad.
+const DELIVERED_DIRECTION: f64 = 15.0 * std::f64::consts::PI / 180.0;
+/// Sets the draw of a start's errors apart from the trial's noise, which has the same seed.
+const START_STREAM: u64 = 1;
 
 /// Which cell.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
@@ -46,21 +55,28 @@ pub struct CellKey {
 /// What came of one accepted request.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Kicked {
-    /// Whether the ball was hit.
+    /// Whether the ball was hit: by a kick that passed the audit, and at a share of the asked speed that deserves the name.
     pub hit: bool,
+    /// Whether it was what had been asked: hit, the robot upright, direction within 15 degrees, speed at least 0.8 of it.
+    #[serde(default)]
+    pub delivered: bool,
+    /// Whether the whole kick, run again at a quarter of the step, led to the same.
+    #[serde(default)]
+    pub converged: bool,
     /// Whether the robot stood to the end.
     pub upright: bool,
     /// Speed of the ball, m/s; only when the audit believes it.
     pub ball_speed: Option<f64>,
     /// Speed asked, m/s.
     pub asked_speed: f64,
-    /// Signed direction error, rad.
+    /// Signed direction error of a hit, rad.
     pub direction_error: Option<f64>,
-    /// How far the ball rolls from its place, m: as simulated, and from the last speed on by the rolling deceleration.
+    /// How far the ball of a hit rolls from its place, m, else 0: as simulated, and from the last speed on by the rolling
+    /// deceleration.
     pub distance: f64,
     /// From the plan to the contact, s.
     pub contact: Option<f64>,
-    /// Whether the impact failed the audit.
+    /// Whether the ball was touched by a kick that failed the audit.
     pub audit_invalid: bool,
     /// Joints beyond their limits.
     pub violations: usize,
@@ -95,6 +111,9 @@ pub struct CellResult {
     pub plan_times: Vec<f64>,
     /// Median and 99th percentile of the ticks' times, s.
     pub tick_times: [f64; 2],
+    /// The constants, by their keys, in which a case's world was not the robot's default one.
+    #[serde(default)]
+    pub world_changes: BTreeSet<String>,
 }
 
 /// Measures the ticks of an engine.
@@ -131,25 +150,33 @@ pub fn run_cell(subject: &Subject, scenario: &Scenario, key: &CellKey) -> Result
     let mut plan_times = Vec::with_capacity(key.requests);
     let mut outcomes = Vec::with_capacity(key.requests);
     let mut shared: Option<World> = None;
-    let (seed, count) = (key.seed, key.requests);
-    let cases = match subject.engine(&key.engine)?.own_start() {
-        Some(start) => scenario.cases_about(&start.request, &subject.size, seed, count),
-        None => scenario.cases(&subject.size, seed, count),
-    };
+    let cases = cases(subject, scenario, key)?;
+    let mut world_changes = BTreeSet::new();
     for case in cases {
-        let mut engine = subject.engine(&key.engine)?;
         let world = match &mut shared {
             Some(world) if !scenario.varies_world() => world,
             slot => slot.insert(world(subject, scenario, &case)?),
         };
-        let (outcome, plan_time, _) = run_case(subject, &case, engine.as_mut(), world, &mut ticks)?;
+        world_changes.extend(world.settings().changes(&subject.world()).into_iter().map(|change| change.key));
+        let (outcome, plan_time, _) = run_case(subject, &key.engine, &case, world, &mut ticks)?;
         plan_times.push(plan_time);
         outcomes.push(outcome.map_err(|refusal| refusal.name().to_owned()));
     }
     ticks.sort_by(f32::total_cmp);
     let at = |share: f64| ticks.get(((ticks.len() as f64 * share) as usize).min(ticks.len().max(1) - 1));
     let tick_times = [0.5, 0.99].map(|share| at(share).map_or(0.0, |t| f64::from(*t)));
-    Ok(CellResult { key: key.clone(), outcomes, plan_times, tick_times })
+    Ok(CellResult { key: key.clone(), outcomes, plan_times, tick_times, world_changes })
+}
+
+/// The cases of a cell.
+///
+/// # Errors
+/// When there is no such engine for the robot.
+pub fn cases(subject: &Subject, scenario: &Scenario, key: &CellKey) -> Result<Vec<Case>, BenchError> {
+    Ok(match subject.engine(&key.engine)?.own_start() {
+        Some(start) => scenario.cases_about(&start.request, &subject.size, key.seed, key.requests),
+        None => scenario.cases(&subject.size, key.seed, key.requests),
+    })
 }
 
 /// The world of a case.
@@ -169,6 +196,8 @@ pub fn world(subject: &Subject, scenario: &Scenario, case: &Case) -> Result<Worl
 /// What an accepted request led to.
 #[derive(Debug)]
 pub struct Ran {
+    /// What was asked.
+    pub request: KickRequest,
     /// What the engine planned.
     pub plan: KickPlan,
     /// How it was tried.
@@ -180,23 +209,28 @@ pub struct Ran {
 /// The outcome of a case, the time of its plan (s), and what an accepted request led to.
 pub type Tried = (Result<Kicked, Refusal>, f64, Option<Ran>);
 
-/// Plans and tries one case, from the stand or from where the engine says that its kicks start. Gives the outcome, the
-/// time of the plan (s) and what an accepted request led to.
+/// Plans and tries one case with the engine called `name`, from the stand or from where the engine says that its kicks start.
+/// Gives the outcome, the time of the plan (s) and what an accepted request led to.
 ///
 /// # Errors
-/// When the simulation diverges.
+/// When there is no such engine for the robot, the ball lies in it, or the simulation diverges.
 pub fn run_case(
     subject: &Subject,
+    name: &str,
     case: &Case,
-    engine: &mut dyn KickEngine,
     world: &mut World,
     ticks: &mut Vec<f32>,
 ) -> Result<Tried, BenchError> {
     let robot = &subject.robot;
-    let (q, v, footprint) = match engine.own_start() {
+    // The audit runs the whole kick again, with an engine of its own.
+    let (mut engine, mut twin) = (subject.engine(name)?, subject.engine(name)?);
+    let (mut q, mut v, footprint) = match engine.own_start() {
         Some(start) => (start.q, start.v, start.footprint),
         None => (robot.stand.clone(), vec![0.0; robot.nv()], subject.footprint),
     };
+    let mut rng = ChaCha8Rng::seed_from_u64(case.seed);
+    rng.set_stream(START_STREAM);
+    case.start.disturb(robot, &mut q, &mut v, &mut rng);
     let on_ground = |[x, y]: [f64; 2]| [x + footprint[0], y + footprint[1], subject.size.ball];
     let mut ball = BallState::at_rest(on_ground(case.ball));
     let [vx, vy] = case.ball_velocity;
@@ -211,7 +245,7 @@ pub fn run_case(
     let start = thread_seconds();
     let planned = engine.plan(&case.request, &sensors);
     let plan_time = thread_seconds() - start;
-    let plan = match planned {
+    let plan = match planned.and_then(|plan| twin.plan(&case.request, &sensors).map(|_| plan)) {
         Ok(plan) => plan,
         Err(refusal) => return Ok((Err(refusal), plan_time, None)),
     };
@@ -237,36 +271,43 @@ pub fn run_case(
         direction: case.request.direction,
     };
     let forecast = engine.forecast();
-    let mut timed = Timed { engine, times: ticks, swing: [f64::INFINITY, f64::NEG_INFINITY], forecast };
-    let trial = run_disturbed(world, &settings, &disturbances, &mut timed)?;
+    let mut timed =
+        Timed { engine: engine.as_mut(), times: ticks, swing: [f64::INFINITY, f64::NEG_INFINITY], forecast };
+    let trial = run_disturbed(world, &settings, &disturbances, &mut timed, twin.as_mut())?;
     let mut kicked = judge(subject, case, &trial);
     kicked.forecast = timed.forecast;
     kicked.grounded = grounded(robot, &trial, plan.foot, timed.swing);
     kicked.broken_off = engine.broken_off();
     kicked.precision = plan.precision;
-    Ok((Ok(kicked), plan_time, Some(Ran { plan, settings, trial })))
+    Ok((Ok(kicked), plan_time, Some(Ran { request: case.request, plan, settings, trial })))
 }
 
 fn judge(subject: &Subject, case: &Case, trial: &Trial) -> Kicked {
     let asked_speed = case.request.strength.value();
-    let invalid = trial.impact.is_some() && !trial.audit.faults.is_empty();
-    let impact = trial.impact.as_ref();
-    let hit = impact.is_some_and(|impact| impact.ball_speed() > HIT * asked_speed);
+    let valid = trial.audit.is_valid();
+    let ball_speed = trial.ball_speed.filter(|_| valid);
+    let hit = ball_speed.is_some_and(|speed| speed > HIT * asked_speed);
+    let direction_error = trial.direction_error.filter(|_| hit);
+    let straight = direction_error.is_some_and(|error| error.abs() <= DELIVERED_DIRECTION);
+    let fast = ball_speed.is_some_and(|speed| speed >= DELIVERED_SPEED * asked_speed);
     let first = trial.record.ball.first().map_or([0.0; 3], |ball| ball.position);
     let last_speed = trial.record.ball.last().map_or(0.0, |ball| ball.velocity[0].hypot(ball.velocity[1]));
     let rolled = (trial.ball_end[0] - first[0]).hypot(trial.ball_end[1] - first[1]);
+    let distance = rolled + last_speed * last_speed / (2.0 * subject.size.deceleration);
     Kicked {
         hit,
+        delivered: hit && trial.upright() && straight && fast,
+        converged: trial.audit.converged,
         upright: trial.upright(),
-        ball_speed: impact.filter(|_| !invalid).map(|impact| impact.ball_speed()),
+        ball_speed,
         asked_speed,
-        direction_error: trial.direction_error.filter(|_| hit),
-        distance: rolled + last_speed * last_speed / (2.0 * subject.size.deceleration),
-        contact: impact.map(|impact| impact.time),
-        audit_invalid: invalid,
+        direction_error,
+        distance: if hit { distance } else { 0.0 },
+        contact: trial.impact.as_ref().map(|impact| impact.time),
+        audit_invalid: trial.impact.is_some() && !valid,
         violations: trial.limit_violations.len(),
         turn: case.turn,
-        turn_error: trial.direction_error.filter(|_| hit).map(|error| -case.side * error),
+        turn_error: direction_error.map(|error| -case.side * error),
         forecast: None,
         precision: 0.0,
         grounded: 0,

@@ -42,8 +42,8 @@ pub struct Directions {
     pub offset_deg: Option<f64>,
     /// Standard deviation of the error over all hits, deg.
     pub spread_deg: Option<f64>,
-    /// Spearman's rank correlation of the stated standard deviation (which grows with acos g) with the absolute error;
-    /// `None` where either is the same for all.
+    /// Spearman's rank correlation of -g, the engine's forecast of the direction (paper 3, equation 1: 1 is straight), with the
+    /// absolute error; `None` for engines without a forecast and where either is the same for all.
     pub rank_correlation: Option<f64>,
 }
 
@@ -89,8 +89,8 @@ fn of(cells: &[&CellResult]) -> Directions {
         }
     };
     let off = errors(&kicked);
-    let (stated, came): (Vec<f64>, Vec<f64>) =
-        kicked.iter().filter_map(|kick| Some((kick.precision, kick.turn_error?.abs()))).unzip();
+    let (forecast, came): (Vec<f64>, Vec<f64>) =
+        kicked.iter().filter_map(|kick| Some((-kick.forecast?, kick.turn_error?.abs()))).unzip();
     let key = &cells[0].key;
     Directions {
         engine: key.engine.clone(),
@@ -99,7 +99,7 @@ fn of(cells: &[&CellResult]) -> Directions {
         directions: asked.into_iter().map(one).collect(),
         offset_deg: mean(&off),
         spread_deg: spread(&off),
-        rank_correlation: rank_correlation(&stated, &came),
+        rank_correlation: rank_correlation(&forecast, &came),
     }
 }
 

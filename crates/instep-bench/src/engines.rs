@@ -217,12 +217,7 @@ impl Subject {
     /// The world's constants for this robot's ball.
     #[must_use]
     pub fn world(&self) -> WorldSettings {
-        let mut world =
-            WorldSettings { ball: Ball { mass: self.ball.mass, radius: self.ball.radius }, ..WorldSettings::default() };
-        world.pitch.rolling_deceleration = self.ball.deceleration;
-        // A light ball needs a finer near step than the default for the audit's 2 %.
-        world.step.near = 0.0001;
-        world
+        world(&self.ball)
     }
 
     /// The engine called `name`.
@@ -262,6 +257,17 @@ impl Subject {
         let grid = Arc::new(load_grid(&self.folder)?);
         Ok(Box::new(AdaptiveKick::new(Arc::clone(&self.robot), self.ball, settings, grid)?))
     }
+}
+
+/// The world's constants for a ball.
+#[must_use]
+pub fn world(ball: &BallModel) -> WorldSettings {
+    let BallModel { mass, radius, deceleration, .. } = *ball;
+    let ball = Ball { mass, radius, rolling_deceleration: deceleration, ..Ball::default() };
+    let mut world = WorldSettings { ball, ..WorldSettings::default() };
+    // A light ball needs a finer near step than the default for the audit's 2 %.
+    world.step.near = 0.0001;
+    world
 }
 
 fn entry(name: &str) -> Result<&'static Entry, BenchError> {

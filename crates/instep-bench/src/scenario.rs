@@ -11,6 +11,7 @@ use std::path::Path;
 
 use instep_kick::{KickRequest, Strength};
 use instep_sim::settings::{ModelError, SensorNoise};
+use instep_sim::start::StartErrors;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
@@ -37,6 +38,9 @@ pub struct Scenario {
     /// In place of both: the kick of an engine that has its own start.
     #[serde(default)]
     pub run_up: Option<RunUp>,
+    /// How the start differs from the stand, or from the engine's own start: what walking leaves behind.
+    #[serde(default)]
+    pub start: StartErrors,
     /// Noise and delay of sensors; the ball's noise is also in the request.
     #[serde(default)]
     pub sensors: SensorNoise,
@@ -51,15 +55,22 @@ pub struct Scenario {
     pub disturbance: DisturbanceRange,
 }
 
-/// Where the ball lies. Either side of the robot, with equal chance.
+/// Where the ball lies. Either side of the robot, with equal chance. Either by shares of the robot's size, `gap` and `lateral`,
+/// or by what a match asks of any robot, `ahead` and `aside`.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BallPlace {
     /// Gap between the toes' line and the ball's surface, share of the leg length.
+    #[serde(default)]
     pub gap: Range,
     /// Distance of the ball's centre from the middle line, share of half the distance of the soles; below zero is on
     /// the other side.
+    #[serde(default)]
     pub lateral: Range,
+    /// Distance of the ball's centre ahead of the middle between the soles, m; more where the toes leave it no room.
+    pub ahead: Option<Range>,
+    /// Distance of the ball's centre from the middle line, m.
+    pub aside: Option<Range>,
 }
 
 /// Which kick is asked.
@@ -123,6 +134,8 @@ pub struct DisturbanceRange {
     pub ball_moved_before: Option<Range>,
     /// Speed of a ball that rolls toward the place where it is to be kicked, m/s.
     pub rolling: Option<Range>,
+    /// Which share of the balls rolls; the others lie still. 1 when absent.
+    pub rolling_share: Option<f64>,
     /// Where it comes from, degrees from the kick's direction reversed; 0 comes straight at the foot.
     pub rolling_from_deg: Option<Range>,
     /// Seconds from the start after which a rolling ball is at its place with that speed; 1.5 when absent, about a kick's
@@ -166,10 +179,14 @@ pub struct Case {
     pub turn: f64,
     /// +1 for a ball on the left, -1 for one on the right.
     pub side: f64,
+    /// How the start differs from the stand.
+    pub start: StartErrors,
     /// Seed of the trial's noise.
     pub seed: u64,
 }
 
+/// Room between toes and ball where a scenario would have put the ball into the feet, m.
+const ROOM: f64 = 0.005;
 /// Seconds of rolling that a moving ball's place is drawn for where the scenario says nothing.
 const ROLL_TIME: f64 = 1.5;
 
@@ -222,6 +239,8 @@ impl Scenario {
             ("disturbance.ball_moved_before", d.ball_moved_before),
             ("disturbance.rolling", d.rolling),
             ("disturbance.rolling_from_deg", d.rolling_from_deg),
+            ("ball.ahead", self.ball.ahead),
+            ("ball.aside", self.ball.aside),
             ("run_up.shift", self.run_up.map(|run_up| run_up.shift)),
         ];
         let (ball, kick) = (self.ball != BallPlace::default(), self.kick != Kick::default());
@@ -242,9 +261,11 @@ impl Scenario {
         }
         let whole = self.kick.sweep.is_none_or(|count| (2..=1000).contains(&count));
         let time = d.rolling_time.unwrap_or(ROLL_TIME);
+        let share = d.rolling_share.unwrap_or(1.0);
         for (field, found, good, expected) in [
             ("kick.sweep", self.kick.sweep.unwrap_or(0) as f64, whole, "a number of directions from 2 to 1000"),
             ("disturbance.rolling_time", time, (0.0..=20.0).contains(&time), "a number in [0, 20] s"),
+            ("disturbance.rolling_share", share, (0.0..=1.0).contains(&share), "a share in [0, 1]"),
         ] {
             if !good {
                 return Err(BenchError::Field {
@@ -312,7 +333,13 @@ impl Scenario {
         let side = if draw([0.0, 1.0]) < 0.5 { 1.0 } else { -1.0 };
         let gap = draw(self.ball.gap) * size.leg;
         let lateral = draw(self.ball.lateral) * size.half_width;
-        let target = [size.toes + gap + size.ball, side * lateral];
+        let nearest = size.toes + ROOM + size.ball;
+        let target = match (self.ball.ahead, self.ball.aside) {
+            (None, None) => [size.toes + gap + size.ball, side * lateral],
+            (ahead, aside) => {
+                [draw(ahead.unwrap_or([nearest; 2])).max(nearest), side * draw(aside.unwrap_or([0.0; 2]))]
+            }
+        };
         let drawn = draw(self.kick.direction_deg);
         let asked = self.kick.sweep.map_or(drawn, |count| {
             let [low, high] = self.kick.direction_deg;
@@ -328,7 +355,11 @@ impl Scenario {
             (draw(d.push.unwrap_or(any)), draw(d.push_before.unwrap_or(any)), draw([0.0, turn]));
         let (moved, moved_before, moved_angle) =
             (draw(d.ball_moved.unwrap_or(any)), draw(d.ball_moved_before.unwrap_or(any)), draw([0.0, turn]));
-        let (rolling, from) = (draw(d.rolling.unwrap_or(any)), draw(d.rolling_from_deg.unwrap_or(any)).to_radians());
+        let (mut rolling, from) =
+            (draw(d.rolling.unwrap_or(any)), draw(d.rolling_from_deg.unwrap_or(any)).to_radians());
+        if d.rolling_share.is_some_and(|share| draw([0.0, 1.0]) >= share) {
+            rolling = 0.0;
+        }
         let mut one = |range: Option<Range>| {
             let value = draw(range.unwrap_or(any));
             range.map(|_| value)
@@ -352,8 +383,12 @@ impl Scenario {
         let time = if rolling > 0.0 { d.rolling_time.unwrap_or(ROLL_TIME) } else { 0.0 };
         let start_speed = rolling + size.deceleration * time;
         let way = (start_speed - 0.5 * size.deceleration * time) * time;
-        let ball = [target[0] - way * heading.cos(), target[1] - way * heading.sin()];
-        let ball_velocity = [start_speed * heading.cos(), start_speed * heading.sin()];
+        let mut ball = [target[0] - way * heading.cos(), target[1] - way * heading.sin()];
+        let mut ball_velocity = [start_speed * heading.cos(), start_speed * heading.sin()];
+        // A ball cannot come through the robot: it lies still.
+        if rolling > 0.0 && ball[0] < nearest && ball[1].abs() < 3.0 * size.half_width + size.ball {
+            (ball, ball_velocity) = (target, [0.0; 2]);
+        }
         let request = KickRequest {
             ball: [ball[0] + radius * u2.cos(), ball[1] + radius * u2.sin()],
             ball_velocity,
@@ -375,6 +410,7 @@ impl Scenario {
             ball_moved: d.ball_moved.map(|_| (moved_before, polar(moved * size.leg, moved_angle))),
             turn: asked.to_radians(),
             side,
+            start: self.start,
             seed: rng.random(),
         }
     }

@@ -1,12 +1,14 @@
 //! From cells to the table: one row a cell, or one row for all seeds of a cell, as Markdown, CSV and JSON.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
+use instep_sim::NamedRate;
 use serde::Serialize;
 
 use crate::cell::{CellResult, Kicked};
 
-/// One row. The names of the fields are KickBench's file format.
+/// One row. The names of the fields are KickBench's file format. Each rate is three keys, `…_low` and `…_high` being its 95 %
+/// interval (Wilson).
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Row {
     /// Engine.
@@ -17,16 +19,29 @@ pub struct Row {
     pub scenario: String,
     /// Seed, or "all".
     pub seed: SeedName,
+    /// The first seed of all.
+    pub seed_first: u64,
     /// How many requests.
     pub requests: usize,
     /// How many were refused.
     pub refused: usize,
     /// Why: the cause's name and how often.
     pub refused_why: BTreeMap<String, usize>,
-    /// Hits over accepted requests; `None` when none was accepted.
-    pub hit_rate: Option<f64>,
+    /// Accepted over all requests.
+    #[serde(flatten)]
+    pub accepted: NamedRate,
+    /// Hits over accepted requests; null when none was accepted.
+    #[serde(flatten)]
+    pub hit: NamedRate,
     /// Kicks that ended standing over accepted requests.
-    pub upright_rate: Option<f64>,
+    #[serde(flatten)]
+    pub upright: NamedRate,
+    /// Kicks that were what had been asked over all requests.
+    #[serde(flatten)]
+    pub delivered: NamedRate,
+    /// Kicks that touched the ball and whose re-run at a quarter of the step led to the same, over those that touched it.
+    #[serde(flatten)]
+    pub converged: NamedRate,
     /// Median of the audited ball speeds, m/s.
     pub ball_speed_median: Option<f64>,
     /// Median of the audited ball speeds over the asked ones.
@@ -37,6 +52,8 @@ pub struct Row {
     pub direction_error_p90_deg: Option<f64>,
     /// Median distance that the ball rolls, m.
     pub distance_median: Option<f64>,
+    /// Quartiles of the audited ball speeds over the asked ones.
+    pub speed_ratio_quartiles: [Option<f64>; 2],
     /// Median time from the request to the contact, s.
     pub contact_median_s: Option<f64>,
     /// Median time of a plan, s.
@@ -47,10 +64,12 @@ pub struct Row {
     pub tick_p50_s: f64,
     /// 99th percentile of the time of a tick, s (of the slowest cell).
     pub tick_p99_s: f64,
-    /// Impacts that failed the audit.
+    /// Kicks that touched the ball and failed the audit.
     pub audit_invalid: usize,
     /// Joints beyond torque or speed limits, over all trials.
     pub limit_violations: usize,
+    /// The constants in which the worlds of its trials were not the robot's default one.
+    pub world_changes: BTreeSet<String>,
 }
 
 /// A seed, or all of them.
@@ -98,15 +117,28 @@ pub fn rows(cells: &[CellResult]) -> Vec<Row> {
 /// One row for all seeds of the same engine, robot and scenario, in the cells' order.
 #[must_use]
 pub fn rows_over_seeds(cells: &[CellResult]) -> Vec<Row> {
-    let mut groups: Vec<Vec<&CellResult>> = Vec::new();
     let key = |cell: &CellResult| (cell.key.engine.clone(), cell.key.robot.clone(), cell.key.scenario.clone());
+    groups(cells, key).iter().map(|group| row(group, SeedName::All(AllSeeds::All))).collect()
+}
+
+/// One row for all scenarios and seeds of the same engine and robot: the scenario's name is "all".
+#[must_use]
+pub fn overview(cells: &[CellResult]) -> Vec<Row> {
+    let key = |cell: &CellResult| (cell.key.engine.clone(), cell.key.robot.clone());
+    let all = |group: &Vec<&CellResult>| Row { scenario: "all".into(), ..row(group, SeedName::All(AllSeeds::All)) };
+    groups(cells, key).iter().map(all).collect()
+}
+
+/// Cells with the same key together, in the order of their first ones.
+fn groups<K: PartialEq>(cells: &[CellResult], key: impl Fn(&CellResult) -> K) -> Vec<Vec<&CellResult>> {
+    let mut groups: Vec<Vec<&CellResult>> = Vec::new();
     for cell in cells {
-        match groups.iter_mut().find(|group| group.first().is_some_and(|first| key(first) == key(cell))) {
+        match groups.iter_mut().find(|group| key(group[0]) == key(cell)) {
             Some(group) => group.push(cell),
             None => groups.push(vec![cell]),
         }
     }
-    groups.iter().map(|group| row(group, SeedName::All(AllSeeds::All))).collect()
+    groups
 }
 
 fn row(cells: &[&CellResult], seed: SeedName) -> Row {
@@ -117,12 +149,13 @@ fn row(cells: &[&CellResult], seed: SeedName) -> Row {
     for name in outcomes().filter_map(|outcome| outcome.as_ref().err()) {
         *refused_why.entry(name.clone()).or_insert(0) += 1;
     }
-    let rate = |good: fn(&Kicked) -> bool| {
-        (!kicked.is_empty()).then(|| kicked.iter().filter(|k| good(k)).count() as f64 / kicked.len() as f64)
-    };
+    let requests = outcomes().count();
+    let count = |good: fn(&Kicked) -> bool| kicked.iter().filter(|kick| good(kick)).count();
+    let touched = count(|kick| kick.contact.is_some());
     let of = |value: fn(&Kicked) -> Option<f64>, share: f64| {
         quantile(kicked.iter().filter_map(|k| value(k)).collect(), share)
     };
+    let ratio = |k: &Kicked| k.ball_speed.map(|v| v / k.asked_speed);
     let error = |k: &Kicked| k.direction_error.map(|e| e.to_degrees().abs());
     let plans = |share: f64| quantile(cells.iter().flat_map(|c| c.plan_times.iter().copied()).collect(), share);
     let tick = |i: usize| cells.iter().map(|cell| cell.tick_times[i]).fold(0.0, f64::max);
@@ -131,13 +164,18 @@ fn row(cells: &[&CellResult], seed: SeedName) -> Row {
         robot: first.robot.clone(),
         scenario: first.scenario.clone(),
         seed,
-        requests: outcomes().count(),
-        refused: outcomes().count() - kicked.len(),
+        seed_first: cells.iter().map(|cell| cell.key.seed).min().unwrap_or(0),
+        requests,
+        refused: requests - kicked.len(),
         refused_why,
-        hit_rate: rate(|k| k.hit),
-        upright_rate: rate(|k| k.upright),
+        accepted: NamedRate::of("accepted_rate", kicked.len(), requests),
+        hit: NamedRate::of("hit_rate", count(|kick| kick.hit), kicked.len()),
+        upright: NamedRate::of("upright_rate", count(|kick| kick.upright), kicked.len()),
+        delivered: NamedRate::of("delivered_rate", count(|kick| kick.delivered), requests),
+        converged: NamedRate::of("converged_rate", count(|kick| kick.converged), touched),
         ball_speed_median: of(|k| k.ball_speed, 0.5),
-        speed_ratio_median: of(|k| k.ball_speed.map(|v| v / k.asked_speed), 0.5),
+        speed_ratio_median: of(ratio, 0.5),
+        speed_ratio_quartiles: [of(ratio, 0.25), of(ratio, 0.75)],
         direction_error_median_deg: of(error, 0.5),
         direction_error_p90_deg: of(error, 0.9),
         distance_median: of(|k| k.hit.then_some(k.distance), 0.5),
@@ -148,7 +186,52 @@ fn row(cells: &[&CellResult], seed: SeedName) -> Row {
         tick_p99_s: tick(1),
         audit_invalid: kicked.iter().filter(|k| k.audit_invalid).count(),
         limit_violations: kicked.iter().map(|k| k.violations).sum(),
+        world_changes: cells.iter().flat_map(|cell| cell.world_changes.iter().cloned()).collect(),
     }
+}
+
+/// A rate in per cent with its interval: "93 (84-97)".
+#[must_use]
+pub fn percent(rate: &NamedRate) -> String {
+    rate.rate.map_or_else(
+        || "-".to_owned(),
+        |r| format!("{:.0} ({:.0}-{:.0})", 100.0 * r.share, 100.0 * r.low, 100.0 * r.high),
+    )
+}
+
+/// The table with one line for each engine and robot.
+#[must_use]
+pub fn overview_markdown(cells: &[CellResult]) -> String {
+    let head = [
+        "engine",
+        "robot",
+        "requests",
+        "accepted %",
+        "hit %",
+        "upright %",
+        "delivered %",
+        "ball speed of asked",
+        "off deg p50/p90",
+        "audit failed",
+    ];
+    let number = |value: Option<f64>, digits: usize| value.map_or_else(|| "-".to_owned(), |v| format!("{v:.digits$}"));
+    let mut text = format!("| {} |\n|{}\n", head.join(" | "), "---|".repeat(head.len()));
+    for r in overview(cells) {
+        let line = [
+            r.engine.clone(),
+            r.robot.clone(),
+            r.requests.to_string(),
+            percent(&r.accepted),
+            percent(&r.hit),
+            percent(&r.upright),
+            percent(&r.delivered),
+            number(r.speed_ratio_median, 2),
+            format!("{}/{}", number(r.direction_error_median_deg, 1), number(r.direction_error_p90_deg, 1)),
+            r.audit_invalid.to_string(),
+        ];
+        text += &format!("| {} |\n", line.join(" | "));
+    }
+    text
 }
 
 /// Headings and cells of the table for people; which seed a row is of stands only in CSV and JSON.
@@ -159,9 +242,10 @@ pub fn text_table(rows: &[Row]) -> (Vec<&'static str>, Vec<Vec<String>>) {
         "robot",
         "scenario",
         "requests",
-        "refused",
+        "accepted %",
         "hit %",
         "upright %",
+        "delivered %",
         "ball m/s (of asked)",
         "off deg p50/p90",
         "rolled m",
@@ -185,9 +269,10 @@ pub fn text_table(rows: &[Row]) -> (Vec<&'static str>, Vec<Vec<String>>) {
                 r.robot.clone(),
                 r.scenario.clone(),
                 r.requests.to_string(),
-                r.refused.to_string(),
-                number(r.hit_rate, 100.0, 1),
-                number(r.upright_rate, 100.0, 1),
+                percent(&r.accepted),
+                percent(&r.hit),
+                percent(&r.upright),
+                percent(&r.delivered),
                 format!("{} ({})", number(r.ball_speed_median, 1.0, 2), number(r.speed_ratio_median, 1.0, 2)),
                 pair(r.direction_error_median_deg, r.direction_error_p90_deg, 1.0, 1),
                 number(r.distance_median, 1.0, 2),
@@ -226,6 +311,7 @@ pub fn csv(rows: &[Row]) -> String {
         let cells = fields.values().map(|value| match value {
             serde_json::Value::Null => String::new(),
             serde_json::Value::String(text) => text.clone(),
+            serde_json::Value::Array(list) => list.iter().map(ToString::to_string).collect::<Vec<_>>().join(" "),
             serde_json::Value::Object(map) => map.iter().map(|(k, v)| format!("{k}:{v}")).collect::<Vec<_>>().join(" "),
             other => other.to_string(),
         });
@@ -235,8 +321,8 @@ pub fn csv(rows: &[Row]) -> String {
     text
 }
 
-/// The table as a JSON object whose `rows` hold one object a row.
+/// The table as a JSON object: `rows` hold one object for each engine, robot and scenario, `seeds` one for each seed of those.
 #[must_use]
-pub fn json(rows: &[Row]) -> serde_json::Value {
-    serde_json::json!({ "rows": rows })
+pub fn json(cells: &[CellResult]) -> serde_json::Value {
+    serde_json::json!({ "rows": rows_over_seeds(cells), "seeds": rows(cells) })
 }

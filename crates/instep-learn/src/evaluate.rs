@@ -10,7 +10,7 @@ use instep_kick::policy::{Policy, PolicyKick};
 use instep_robot::Robot;
 use instep_sim::settings::WorldSettings;
 use instep_sim::trial::{self, LimitViolation, Trial, TrialSettings};
-use instep_sim::{BallState, World};
+use instep_sim::{BallState, NamedRate, World};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -73,15 +73,19 @@ pub struct Tried {
     pub completed: bool,
     /// Mean over the clip and the links of the distance from the reference, m.
     pub link_error: f64,
-    /// m/s; `None` when the ball was not touched or the audit refused the impact.
+    /// Whether the ball was hit by a kick that the audit believes.
+    pub hit: bool,
+    /// Whether the whole kick, run again at a quarter of the step, led to the same.
+    pub converged: bool,
+    /// m/s; `None` when the ball was not touched or the audit refused the kick.
     pub ball_speed: Option<f64>,
-    /// From straight ahead to the ball's direction, positive to the left, degrees.
+    /// From straight ahead to the ball's direction, positive to the left, degrees; `None` as above.
     pub direction_error_deg: Option<f64>,
     /// Whether the robot stood to the trial's end, at least two seconds after the contact.
     pub upright: bool,
     /// When it fell, s.
     pub fell_at: Option<f64>,
-    /// Whether the ball was hit but the audit refused it.
+    /// Whether the ball was touched but the audit refused the kick.
     pub audit_invalid: bool,
     /// Joints beyond a torque or speed limit.
     pub limit_violations: usize,
@@ -95,7 +99,8 @@ pub struct Summary {
     /// Number of trials.
     pub trials: usize,
     /// Share that followed the clip to its end.
-    pub completed_rate: f64,
+    #[serde(flatten)]
+    pub completed: NamedRate,
     /// Mean of the trials' link errors, m.
     pub link_error_mean: f64,
     /// Their standard deviation, m.
@@ -105,10 +110,15 @@ pub struct Summary {
     /// Median of the absolute direction errors, degrees.
     pub direction_error_median_deg: Option<f64>,
     /// Share that stood to the end.
-    pub upright_rate: f64,
-    /// Share that touched the ball.
-    pub hit_rate: f64,
-    /// Hits that the audit refused.
+    #[serde(flatten)]
+    pub upright: NamedRate,
+    /// Share that hit the ball with a kick that the audit believes.
+    #[serde(flatten)]
+    pub hit: NamedRate,
+    /// Share whose re-run at a quarter of the step led to the same.
+    #[serde(flatten)]
+    pub converged: NamedRate,
+    /// Touched balls that the audit refused.
     pub audit_invalid: usize,
     /// Joints beyond a limit, over all trials.
     pub limit_violations: usize,
@@ -157,6 +167,7 @@ pub fn evaluate(
 /// One trial of a policy at the evaluation's start, with the small start errors of its seed.
 fn kick(robot: &Arc<Robot>, policy: &Policy, evaluation: &Evaluation, world: &mut World) -> Result<Trial, LearnError> {
     let mut engine = PolicyKick::new(robot, policy, evaluation.start)?;
+    let mut twin = PolicyKick::new(robot, policy, evaluation.start)?;
     let (mut q, mut v) = engine.initial_state();
     let mut rng = ChaCha8Rng::seed_from_u64(evaluation.seed);
     let errors = &evaluation.errors;
@@ -174,7 +185,7 @@ fn kick(robot: &Arc<Robot>, policy: &Policy, evaluation: &Evaluation, world: &mu
         ball: BallState::at_rest(ball),
         direction: 0.0,
     };
-    Ok(trial::run_in(world, &settings, &mut engine)?)
+    Ok(trial::run_in(world, &settings, &mut engine, &mut twin)?)
 }
 
 fn attempt(
@@ -206,18 +217,19 @@ fn attempt(
         count += 1;
         farthest = farthest.max(deviation.farthest.0);
     }
-    let valid = trial.audit.verdict() == "valid";
-    let hit = trial.impact.is_some();
+    let valid = trial.audit.is_valid();
     let clip_end = track.duration() - evaluation.start;
     Ok(Tried {
         seed: evaluation.seed,
         completed: farthest <= COMPLETED && trial.fell_at.is_none_or(|time| time > clip_end),
         link_error: sum / f64::from(count.max(1)),
-        ball_speed: trial.impact.as_ref().filter(|_| valid).map(instep_sim::impact::Impact::ball_speed),
-        direction_error_deg: trial.direction_error.map(f64::to_degrees),
+        hit: valid,
+        converged: trial.audit.converged,
+        ball_speed: trial.ball_speed.filter(|_| valid),
+        direction_error_deg: trial.direction_error.filter(|_| valid).map(f64::to_degrees),
         upright: trial.upright(),
         fell_at: trial.fell_at,
-        audit_invalid: hit && !valid,
+        audit_invalid: trial.impact.is_some() && !valid,
         limit_violations: trial.limit_violations.len(),
         beyond: trial.limit_violations,
     })
@@ -225,18 +237,21 @@ fn attempt(
 
 fn summary(each: Vec<Tried>) -> Summary {
     let count = each.len().max(1) as f64;
-    let share = |good: &dyn Fn(&Tried) -> bool| each.iter().filter(|tried| good(tried)).count() as f64 / count;
+    let rate = |name, good: fn(&Tried) -> bool| {
+        NamedRate::of(name, each.iter().filter(|tried| good(tried)).count(), each.len())
+    };
     let mean = each.iter().map(|tried| tried.link_error).sum::<f64>() / count;
     let variance = each.iter().map(|tried| (tried.link_error - mean).powi(2)).sum::<f64>() / count;
     Summary {
         trials: each.len(),
-        completed_rate: share(&|tried| tried.completed),
+        completed: rate("completed_rate", |tried| tried.completed),
         link_error_mean: mean,
         link_error_deviation: variance.sqrt(),
         ball_speed_median: median(each.iter().filter_map(|tried| tried.ball_speed)),
         direction_error_median_deg: median(each.iter().filter_map(|tried| tried.direction_error_deg.map(f64::abs))),
-        upright_rate: share(&|tried| tried.upright),
-        hit_rate: share(&|tried| tried.direction_error_deg.is_some()),
+        upright: rate("upright_rate", |tried| tried.upright),
+        hit: rate("hit_rate", |tried| tried.hit),
+        converged: rate("converged_rate", |tried| tried.converged),
         audit_invalid: each.iter().filter(|tried| tried.audit_invalid).count(),
         limit_violations: each.iter().map(|tried| tried.limit_violations).sum(),
         each,

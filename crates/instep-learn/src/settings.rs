@@ -3,9 +3,8 @@
 
 use instep_kick::policy::{Activation, FollowerSettings};
 use instep_robot::Robot;
-use rand::RngExt;
+use instep_sim::start::StartErrors;
 use rand_chacha::ChaCha8Rng;
-use rand_distr::StandardNormal;
 use serde::{Deserialize, Serialize};
 
 use crate::LearnError;
@@ -162,12 +161,8 @@ impl Default for StartSettings {
 impl StartSettings {
     /// Adds random errors to a start state q (7 + n), v (6 + n) of `robot`.
     pub(crate) fn disturb(&self, robot: &Robot, q: &mut [f64], v: &mut [f64], rng: &mut ChaCha8Rng) {
-        let mut draw = |deviation: f64| deviation * rng.sample::<f64, _>(StandardNormal);
-        for (i, joint) in robot.joints.iter().enumerate() {
-            q[7 + i] = (q[7 + i] + draw(self.joint)).clamp(joint.range[0], joint.range[1]);
-            v[6 + i] += draw(self.joint_speed);
-        }
-        v[..3].iter_mut().for_each(|v| *v += draw(self.base_speed));
+        let Self { joint, joint_speed, base_speed, .. } = *self;
+        StartErrors { joint, joint_speed, base_speed }.disturb(robot, q, v, rng);
     }
 }
 

@@ -275,6 +275,7 @@ fn report() -> Report {
         vec![joint.into(), torque.into(), Cell::judged(share, verdict), speed.into()]
     };
     Report {
+        matrix: None,
         title: "Kick at 4 m/s, straight ahead".into(),
         subtitle: "Demo figure \u{b7} drawn, not simulated \u{b7} ball 0.20 m ahead of the right foot \u{b7} seed 7"
             .into(),

@@ -2,7 +2,7 @@
 //!
 //! This crate knows nothing about simulators, robots or kicks. It takes plain numbers:
 //!
-//! - a [`Report`] (summary, 3-D [`Replay`], [`Plot`]s, [`Table`]s) becomes one HTML file that opens in any browser
+//! - a [`Report`] (summary, 3-D [`Replay`], [`Plot`]s, a [`Matrix`], [`Table`]s) becomes one HTML file that opens in any browser
 //!   without a network and without third-party script;
 //! - a [`mcap::Recording`] becomes an MCAP file of ROS 2 messages that Rerun, Foxglove, PlotJuggler and `rosbags` open.
 //!
@@ -13,6 +13,7 @@ mod color;
 mod error;
 mod file;
 mod html;
+mod matrix;
 pub mod mcap;
 mod plot;
 mod replay;
@@ -20,6 +21,7 @@ mod report;
 
 pub use color::Color;
 pub use error::ReportError;
+pub use matrix::{Matrix, MatrixCell, MatrixRow, Measure};
 pub use plot::{Axis, Limit, Plot, Region, Samples, Series};
 pub use replay::{Actor, Arrow, ArrowFrame, Camera, Event, Finish, Marking, Part, Pitch, Pose, Replay, Shape};
 pub use report::{Align, Cell, Column, Report, SummaryItem, Table, Verdict};

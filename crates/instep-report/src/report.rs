@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::{Plot, Replay, ReportError, file, html};
+use crate::{Matrix, Plot, Replay, ReportError, file, html};
 
 /// One page: a person opens it and knows how the trial went.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -13,6 +13,8 @@ pub struct Report {
     pub subtitle: String,
     /// The few numbers that matter, shown large.
     pub summary: Vec<SummaryItem>,
+    /// A comparison of many with many.
+    pub matrix: Option<Matrix>,
     /// Detail, in order.
     pub tables: Vec<Table>,
     /// The 3-D view.

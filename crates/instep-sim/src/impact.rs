@@ -1,18 +1,18 @@
-//! What happened between foot and ball: watched at every near step, evaluated once the ball is free again.
+//! What happened between robot and ball: every touch watched at every step, evaluated once the trial is over.
 //!
-//! Definitions (facts/physics-of-the-kick.md). The impact starts with the first contact and ends with the last one
-//! before a pause of [`PAUSE`]. Its normal n is the direction of the impulse on the ball; its striking point is that of
-//! the largest force, fixed to the link that gave it. Restitution is (ball's speed after - point's speed after) /
-//! (point's speed before - ball's speed before) along n; effective mass is 1 / (n^T J M^-1 J^T n) of the free robot.
+//! Definitions (facts/physics-of-the-kick.md). A touch starts with the first contact and ends with the last one before a
+//! pause of [`PAUSE`]. Its normal n is the direction of the impulse on the ball; its striking point is that of the largest
+//! force, fixed to the link that gave it. Along n, restitution is what ball and point part at over what they approached each
+//! other at; effective mass is 1 / (n^T J M^-1 J^T n) of the free robot as its model says. Energies are those of the robot that
+//! is in the world, whose masses may differ from its model's.
 
-use instep_robot::{LinkPoint, Robot, RobotData};
+use instep_robot::{LinkPoint, RobotData};
 use nalgebra::Vector3;
 use serde::Serialize;
 
-use crate::settings::Ball;
 use crate::world::{BallState, World};
 
-/// A pause in contact (s) after which the impact is over. A later touch is another one.
+/// A pause in contact (s) after which a touch is over. A later contact is another touch.
 pub const PAUSE: f64 = 0.010;
 
 /// The state of robot and ball at one instant.
@@ -22,7 +22,8 @@ struct Instant {
     q: Vec<f64>,
     v: Vec<f64>,
     ball: Option<BallState>,
-    work: f64,
+    motor_work: f64,
+    push_work: f64,
 }
 
 impl Instant {
@@ -33,22 +34,28 @@ impl Instant {
         self.v.clear();
         self.v.extend_from_slice(world.v());
         self.ball = Some(world.ball());
-        self.work = world.motor_work();
+        self.motor_work = world.motor_work();
+        self.push_work = world.push_work();
     }
 }
 
-/// Watches a world's near steps for the first impact.
-#[derive(Debug, Clone, Default)]
-pub struct ImpactWatch {
-    last: Instant,
-    start: Option<Instant>,
-    end: Instant,
-    last_contact: f64,
+/// One touch as it was watched.
+#[derive(Debug, Clone)]
+struct Touch {
+    before: Instant,
+    after: Instant,
+    impulse: Vector3<f64>,
+    depth: f64,
     largest_force: f64,
     link: usize,
     point: Vector3<f64>,
-    over: bool,
-    touches: usize,
+}
+
+/// Watches a world's steps for touches of robot and ball.
+#[derive(Debug, Clone, Default)]
+pub struct ImpactWatch {
+    last: Instant,
+    touches: Vec<Touch>,
 }
 
 impl ImpactWatch {
@@ -58,111 +65,93 @@ impl ImpactWatch {
         Self::default()
     }
 
-    /// When the first contact started, s.
-    #[must_use]
-    pub fn started(&self) -> Option<f64> {
-        self.start.as_ref().map(|start| start.time)
-    }
-
-    /// How often the robot touched the ball, with pauses in between.
-    #[must_use]
-    pub fn touches(&self) -> usize {
-        self.touches
-    }
-
-    /// Called before a near step.
+    /// Called before a step.
     pub(crate) fn before(&mut self, world: &World) {
         self.last.take(world);
     }
 
-    /// Called after a near step, whose contacts are those at its start.
+    /// Called after a step, whose contacts are those at its start.
     pub(crate) fn after(&mut self, world: &World) {
-        let mut force = 0.0;
-        let mut strongest = 0.0;
-        for (link, point, on_ball) in world.ball_strikes() {
-            let strength = on_ball.norm();
-            force += strength;
-            if !self.over && strength > self.largest_force.max(strongest) {
-                strongest = strength;
-                self.link = link;
-                self.point = point;
-            }
-        }
-        self.largest_force = self.largest_force.max(strongest);
-        if force <= 0.0 {
+        let strikes = || world.ball_strikes().filter(|strike| strike.force.norm() > 0.0);
+        if strikes().next().is_none() {
             return;
         }
-        if self.start.is_none() {
-            self.start = Some(self.last.clone());
-            self.touches = 1;
-        } else if self.last.time - self.last_contact > PAUSE {
-            self.over = true;
-            self.touches += 1;
+        if self.touches.last().is_none_or(|touch| self.last.time - touch.after.time > PAUSE) {
+            self.touches.push(Touch {
+                before: self.last.clone(),
+                after: Instant::default(),
+                impulse: Vector3::zeros(),
+                depth: 0.0,
+                largest_force: 0.0,
+                link: 0,
+                point: Vector3::zeros(),
+            });
         }
-        self.last_contact = world.time();
-        if !self.over {
-            self.end.take(world);
+        let Some(touch) = self.touches.last_mut() else { return };
+        for strike in strikes() {
+            let strength = strike.force.norm();
+            touch.impulse += strike.force * (world.time() - self.last.time);
+            touch.depth = touch.depth.max(strike.depth);
+            if strength > touch.largest_force {
+                (touch.largest_force, touch.link, touch.point) = (strength, strike.link, strike.point);
+            }
         }
+        touch.after.take(world);
     }
 
-    /// Whether the first impact is over at `time` (s).
+    /// Whether the ball is free at `time` (s): not touched yet, or not for [`PAUSE`].
     #[must_use]
-    pub fn is_over(&self, time: f64) -> bool {
-        self.start.is_some() && (self.over || time - self.last_contact > PAUSE)
+    pub fn is_free(&self, time: f64) -> bool {
+        self.touches.last().is_none_or(|touch| time - touch.after.time > PAUSE)
     }
 
-    /// The first impact, if there was one, with `data` as scratch space of the same robot.
+    /// Every touch in order, with `data` as scratch space of the same robot. Leaves `world` in another state.
     #[must_use]
-    pub fn impact(&self, robot: &Robot, ball: &Ball, data: &mut RobotData) -> Option<Impact> {
-        let start = self.start.as_ref()?;
-        let (ball_before, ball_after) = (start.ball?, self.end.ball?);
-        let before = Vector3::from(ball_before.velocity);
-        let after = Vector3::from(ball_after.velocity);
-        let normal = (after - before).try_normalize(1e-9)?;
+    pub fn touches(&self, world: &mut World, data: &mut RobotData) -> Vec<Impact> {
+        self.touches.iter().filter_map(|touch| touch.impact(world, data)).collect()
+    }
+}
 
-        // The striking point was found somewhere in the impact, in the world: fix it to its link by the state before.
-        data.set_state(&start.q, &start.v);
+impl Touch {
+    fn impact(&self, world: &mut World, data: &mut RobotData) -> Option<Impact> {
+        let (before, after) = (&self.before, &self.after);
+        let (ball_before, ball_after) = (before.ball?, after.ball?);
+        let normal = self.impulse.try_normalize(1e-12)?;
+        // The striking point was found somewhere in the touch, in the world: fix it to its link by the state before.
+        data.set_state(&before.q, &before.v);
         let local = data.link_matrix(self.link).transpose() * (self.point - data.link_position(self.link));
         let striker = LinkPoint { link: self.link, point: local };
         let point_before = data.point_velocity(&striker);
         let effective_mass = data.effective_mass(&striker, &normal);
-        let kinetic_before = data.kinetic_energy() + ball_energy(ball, &ball_before);
-        let height_before = data.com().z * robot.mass() + ball_before.position[2] * ball.mass;
-
-        data.set_state(&self.end.q, &self.end.v);
+        data.set_state(&after.q, &after.v);
         let point_after = data.point_velocity(&striker);
-        let kinetic_after = data.kinetic_energy() + ball_energy(ball, &ball_after);
-        let height_after = data.com().z * robot.mass() + ball_after.position[2] * ball.mass;
-
-        let approach = (point_before - before).dot(&normal);
+        let along = |ball: &BallState, point: Vector3<f64>| (Vector3::from(ball.velocity) - point).dot(&normal);
+        let [kinetic_before, potential_before] = world.energy(&before.q, &before.v, &ball_before);
+        let [kinetic_after, potential_after] = world.energy(&after.q, &after.v, &ball_after);
         Some(Impact {
-            time: start.time,
-            duration: self.end.time - start.time,
-            link: robot.link_name(self.link).to_owned(),
+            time: before.time,
+            duration: after.time - before.time,
+            link: world.robot().link_name(self.link).to_owned(),
             point: self.point.into(),
             normal: normal.into(),
+            impulse: self.impulse.norm(),
+            depth: self.depth,
             foot_speed: point_before.norm(),
             foot_speed_normal: point_before.dot(&normal),
+            approach: -along(&ball_before, point_before),
             effective_mass,
-            restitution: (after - point_after).dot(&normal) / approach,
+            restitution: along(&ball_after, point_after) / -along(&ball_before, point_before),
             ball_velocity: ball_after.velocity,
             kinetic_before,
             kinetic_after,
-            motor_work: self.end.work - start.work,
-            gravity_work: 9.81 * (height_before - height_after),
-            touches: self.touches,
+            motor_work: after.motor_work - before.motor_work,
+            push_work: after.push_work - before.push_work,
+            gravity_work: potential_before - potential_after,
         })
     }
 }
 
-/// Kinetic energy of a thin-shelled ball, J.
-fn ball_energy(ball: &Ball, state: &BallState) -> f64 {
-    let inertia = 2.0 / 3.0 * ball.mass * ball.radius * ball.radius;
-    0.5 * ball.mass * Vector3::from(state.velocity).norm_squared()
-        + 0.5 * inertia * Vector3::from(state.angular_velocity).norm_squared()
-}
-
-/// One impact of the robot on the ball; SI units, world frame.
+/// One touch of the robot on the ball; SI units, world frame.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Impact {
     /// When it started, s.
@@ -175,10 +164,16 @@ pub struct Impact {
     pub point: [f64; 3],
     /// Direction of the impulse on the ball.
     pub normal: [f64; 3],
+    /// The impulse on the ball, N s.
+    pub impulse: f64,
+    /// How deep ball and robot went into one another, m.
+    pub depth: f64,
     /// Speed of the striking point just before, m/s.
     pub foot_speed: f64,
     /// Its part along the normal, m/s.
     pub foot_speed_normal: f64,
+    /// The same beside the ball's own speed: what the two approached each other at, m/s.
+    pub approach: f64,
     /// Effective mass of the striking point along the normal, kg.
     pub effective_mass: f64,
     /// Effective restitution, motors included.
@@ -189,18 +184,18 @@ pub struct Impact {
     pub kinetic_before: f64,
     /// Kinetic energy of robot and ball after, J.
     pub kinetic_after: f64,
-    /// Work of the motors during the impact, J.
+    /// Work of the motors meanwhile, J.
     pub motor_work: f64,
-    /// Work of gravity during the impact, J.
+    /// Work of pushes from outside meanwhile, J.
+    pub push_work: f64,
+    /// Work of gravity meanwhile, J.
     pub gravity_work: f64,
-    /// How often the robot touched the ball in the whole trial.
-    pub touches: usize,
 }
 
 impl Impact {
-    /// Ball's speed just after, m/s.
+    /// Kinetic energy that neither motors nor pushes nor gravity gave, J; negative where it was lost.
     #[must_use]
-    pub fn ball_speed(&self) -> f64 {
-        Vector3::from(self.ball_velocity).norm()
+    pub fn energy_gain(&self) -> f64 {
+        self.kinetic_after - self.kinetic_before - self.motor_work - self.push_work - self.gravity_work
     }
 }

@@ -22,6 +22,18 @@ pub(crate) fn foot_links(robot: &Robot) -> Vec<usize> {
     links
 }
 
+/// The robot's geoms that a ball meets: the striking geoms, which are its feet, and all above that its model lets collide.
+pub(crate) fn solid_geoms(robot: &Robot) -> Vec<usize> {
+    let (model, feet) = (robot.model(), foot_links(robot));
+    let above = |geom: usize| !feet.contains(&usize::try_from(model.geom_bodyid()[geom]).unwrap_or(0));
+    let collides = |geom: usize| model.geom_contype()[geom] != 0 || model.geom_conaffinity()[geom] != 0;
+    let mut geoms: Vec<usize> = (0..model.geom_bodyid().len()).filter(|&geom| collides(geom) && above(geom)).collect();
+    geoms.extend(robot.legs.iter().flat_map(|leg| &leg.strike));
+    geoms.sort_unstable();
+    geoms.dedup();
+    geoms
+}
+
 /// Adds ground, ball and all contact pairs to the robot's specification and sets the solver.
 pub(crate) fn build(spec: &mut MjSpec, robot: &Robot, settings: &WorldSettings) -> Result<(), MjEditError> {
     // Contacts are explicit pairs, and pairs go by name.
@@ -106,16 +118,17 @@ pub(crate) fn build(spec: &mut MjSpec, robot: &Robot, settings: &WorldSettings) 
         let [a, b] = pair.map(geom_name);
         add_pair(spec, &a, &b, 1, [0.1, 0.1, 0.0, 0.0, 0.0], sole, None);
     }
-    for &geom in robot.legs.iter().flat_map(|leg| &leg.strike) {
+    // The ball meets all of the robot, not only what is meant to strike it.
+    for geom in solid_geoms(robot) {
         let grip = settings.impact.friction;
         let friction = [grip, grip, 0.0, 0.0, 0.0];
         add_pair(spec, &geom_name(geom), BALL, 3, friction, solref(&settings.impact), Some(SOLIMP));
     }
     // Rolling of a thin shell: (m + I / r^2) a = N c / r with I = 2/3 m r^2, so c = 5/3 r a / g.
-    let roll = 5.0 / 3.0 * settings.ball.radius * settings.pitch.rolling_deceleration / 9.81;
+    let roll = 5.0 / 3.0 * settings.ball.radius * settings.ball.rolling_deceleration / 9.81;
     let grip = settings.pitch.ball_friction;
     let friction = [grip, grip, 0.005, roll, roll];
-    add_pair(spec, FLOOR, BALL, 6, friction, solref(&settings.pitch.rebound), Some(SOLIMP));
+    add_pair(spec, FLOOR, BALL, 6, friction, solref(&settings.ball.rebound), Some(SOLIMP));
 
     let option = spec.option_mut();
     option.timestep = settings.step.far;

@@ -1,6 +1,5 @@
 //! One kick from start to finish: runs a controller in a world, watches the impact, audits it, measures and records.
 
-use std::collections::VecDeque;
 use std::sync::Arc;
 
 use instep_motion::phase::Side;
@@ -10,11 +9,11 @@ use nalgebra::Vector3;
 use serde::Serialize;
 
 use crate::SimError;
-use crate::audit::Audit;
+use crate::audit::{Audit, Evidence, Outcome, RERUN_FACTOR, hardest};
 use crate::impact::{Impact, ImpactWatch};
 use crate::sensors::{SensorSuite, orientation};
-use crate::settings::{Step, WorldSettings};
-use crate::world::{BallState, Snapshot, World};
+use crate::settings::WorldSettings;
+use crate::world::{BallState, JointPeak, Steps, World};
 
 /// Tilt of the base link beyond which the robot counts as fallen, rad.
 pub const FALLEN_TILT: f64 = 1.05;
@@ -22,8 +21,6 @@ pub const FALLEN_TILT: f64 = 1.05;
 const FALLEN_HEIGHT: f64 = 0.5;
 /// Load (N) above which a contact point of the support foot is expected not to slip.
 const LOADED: f64 = 20.0;
-/// How long before the impact the audit's re-run starts, s.
-const RERUN_LEAD: f64 = 0.008;
 /// Speed beyond the limit that counts as a violation, as a share of the limit: what one step can overshoot.
 const SPEED_TOLERANCE: f64 = 0.02;
 
@@ -108,15 +105,21 @@ pub struct Record {
     pub contact_forces: Vec<f64>,
     /// Ball.
     pub ball: Vec<BallState>,
+    /// Every physics step, where the world was told to keep them.
+    pub steps: Option<Steps>,
 }
 
 /// What came of a kick.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trial {
-    /// The impact, if the ball was touched.
+    /// The touch that gave the ball the largest impulse, if it was touched.
     pub impact: Option<Impact>,
-    /// Whether the impact may be believed.
+    /// Every touch, in order.
+    pub touches: Vec<Impact>,
+    /// Whether all this may be believed.
     pub audit: Audit,
+    /// Ball's speed as it leaves the robot for good, after the last touch, m/s.
+    pub ball_speed: Option<f64>,
     /// Signed angle from the wanted to the real direction of the ball, rad.
     pub direction_error: Option<f64>,
     /// Ball's angle above the horizontal as it leaves, rad.
@@ -145,21 +148,32 @@ impl Trial {
     }
 }
 
-/// Runs `controller` through one kick.
+/// Runs `controller` through one kick, and `twin`, which is in the same state, through the audit's re-run of it.
 ///
 /// # Errors
-/// When the settings cannot be, or the simulation diverges. A missed ball, a fall and an invalid impact are results.
-pub fn run(robot: &Arc<Robot>, settings: &TrialSettings, controller: &mut dyn Controller) -> Result<Trial, SimError> {
+/// When the settings cannot be, the ball overlaps robot or ground at the start, or the simulation diverges. A missed ball, a
+/// fall and an invalid impact are results.
+pub fn run(
+    robot: &Arc<Robot>,
+    settings: &TrialSettings,
+    controller: &mut dyn Controller,
+    twin: &mut dyn Controller,
+) -> Result<Trial, SimError> {
     let mut world = World::new(Arc::clone(robot), &settings.world)?;
-    run_in(&mut world, settings, controller)
+    run_in(&mut world, settings, controller, twin)
 }
 
 /// As [`run`], in a world that was already built for the same robot and `settings.world`.
 ///
 /// # Errors
 /// As [`run`].
-pub fn run_in(world: &mut World, settings: &TrialSettings, controller: &mut dyn Controller) -> Result<Trial, SimError> {
-    run_disturbed(world, settings, &[], controller)
+pub fn run_in(
+    world: &mut World,
+    settings: &TrialSettings,
+    controller: &mut dyn Controller,
+    twin: &mut dyn Controller,
+) -> Result<Trial, SimError> {
+    run_disturbed(world, settings, &[], controller, twin)
 }
 
 /// Something that happens to robot or ball in a trial, whatever the controller does.
@@ -183,7 +197,7 @@ pub enum Disturbance {
     },
 }
 
-/// As [`run_in`], with `disturbances`. A push that starts or ends during the impact makes the audit's re-run differ.
+/// As [`run_in`], with `disturbances`.
 ///
 /// # Errors
 /// As [`run`].
@@ -192,23 +206,108 @@ pub fn run_disturbed(
     settings: &TrialSettings,
     disturbances: &[Disturbance],
     controller: &mut dyn Controller,
+    twin: &mut dyn Controller,
 ) -> Result<Trial, SimError> {
     let robot = Arc::clone(world.robot());
+    let mut data = robot.data();
+    let mut record = Record::default();
+    let course = follow(world, settings, disturbances, controller, Some(&mut record), &mut data)?;
+    let step = settings.world.step;
+    let fine = step.finer(RERUN_FACTOR);
+    let rerun = if course.touches.is_empty() {
+        None
+    } else {
+        world.set_step(fine);
+        let again = follow(world, settings, disturbances, twin, None, &mut data);
+        world.set_step(step);
+        Some((again?.outcome(settings.direction), fine))
+    };
+    let outcome = course.outcome(settings.direction);
+    let audit = Audit::new(&Evidence {
+        touches: &course.touches,
+        finished: course.finished,
+        ball_radius: settings.world.ball.radius,
+        outcome,
+        rerun,
+    });
+    let impact = hardest(&course.touches).map(|i| course.touches[i].clone());
+    let kicker = impact.as_ref().and_then(|impact| kicking_side(&robot, &impact.link));
+    let around = impact.as_ref().zip(kicker);
+    Ok(Trial {
+        ball_speed: outcome.ball_speed,
+        direction_error: outcome.direction_error,
+        launch_angle: course.leaving().map(|v| v.z.atan2(v.x.hypot(v.y))),
+        fell_at: course.fell_at,
+        support_slip: around.map(|(_, side)| record.slip(&robot, side.other(), &mut data)),
+        groups: group_peaks(&robot, &course.peaks),
+        limit_violations: violations(&robot, &course.peaks),
+        segments: around.map_or_else(Vec::new, |(impact, side)| {
+            record.segment_peaks(&robot, side, impact.time, settings.direction, &mut data)
+        }),
+        impact,
+        touches: course.touches,
+        audit,
+        ball_end: course.ball_end,
+        record,
+    })
+}
+
+/// What happened from a trial's start to its end.
+struct Course {
+    touches: Vec<Impact>,
+    finished: bool,
+    fell_at: Option<f64>,
+    peaks: Vec<JointPeak>,
+    ball_end: [f64; 3],
+}
+
+impl Course {
+    /// Ball's velocity as it leaves the robot for good, m/s.
+    fn leaving(&self) -> Option<Vector3<f64>> {
+        self.touches.last().map(|touch| Vector3::from(touch.ball_velocity))
+    }
+
+    fn outcome(&self, direction: f64) -> Outcome {
+        let leaving = self.leaving();
+        Outcome {
+            ball_speed: leaving.map(|v| v.norm()),
+            direction_error: leaving.map(|v| wrap(v.y.atan2(v.x) - direction)),
+            upright: self.fell_at.is_none(),
+        }
+    }
+}
+
+/// Runs one trial in the world's present steps, from the start to the end.
+fn follow(
+    world: &mut World,
+    settings: &TrialSettings,
+    disturbances: &[Disturbance],
+    controller: &mut dyn Controller,
+    mut record: Option<&mut Record>,
+    data: &mut RobotData,
+) -> Result<Course, SimError> {
     let tick = settings.world.step.tick;
     let whole = |time: f64| (time / tick).round().max(1.0) as usize;
-    let (steps, period) = (whole(settings.duration), whole(settings.control_period));
+    let (ticks, period) = (whole(settings.duration), whole(settings.control_period));
 
     world.reset(&settings.q, &settings.v, &settings.ball)?;
+    if let Some((what, depth)) = world.ball_overlap() {
+        let [x, y, z] = settings.ball.position;
+        return Err(SimError::State {
+            found: format!("the ball at ({x:.3}, {y:.3}, {z:.3}) m is {depth:.3} m inside {what}"),
+            expected: "a ball that touches neither robot nor ground".into(),
+        });
+    }
     let mut suite = SensorSuite::new(world, settings.seed);
     suite.sense(world);
     let mut sensors = Sensors::default();
-    let mut command = JointCommand::zeros(robot.joints.len());
+    let mut command = JointCommand::zeros(world.robot().joints.len());
     let mut watch = ImpactWatch::new();
-    let mut log = RerunLog::new();
     let mut fall = FallWatch::default();
-    let mut record = Record::default();
-    record.push(world);
-    for step in 0..steps {
+    if let Some(record) = record.as_deref_mut() {
+        record.push(world);
+    }
+    for step in 0..ticks {
         if step % period == 0 {
             suite.read_into(world.time(), &mut sensors);
             controller.tick(&sensors, &mut command);
@@ -229,38 +328,18 @@ pub fn run_disturbed(
                 }
             }
         }
-        log.note(world, &command, &watch);
         world.advance(&command, Some(&mut watch))?;
         suite.sense(world);
         fall.look(world);
-        record.push(world);
+        if let Some(record) = record.as_deref_mut() {
+            record.push(world);
+        }
     }
-
-    let ball_end = world.ball().position;
-    let finished = watch.is_over(world.time());
-    let peaks = world.peaks().to_vec();
-    let mut data = robot.data();
-    let impact = watch.impact(&robot, &settings.world.ball, &mut data);
-    let rerun = if impact.is_some() { log.rerun(world, &mut data)? } else { None };
-    let audit = Audit::new(impact.as_ref(), rerun.as_ref(), finished);
-    let velocity = impact.as_ref().map(|impact| Vector3::from(impact.ball_velocity));
-    let kicker = impact.as_ref().and_then(|impact| kicking_side(&robot, &impact.link));
-    let around = impact.as_ref().zip(kicker);
-    Ok(Trial {
-        direction_error: velocity.map(|v| wrap(v.y.atan2(v.x) - settings.direction)),
-        launch_angle: velocity.map(|v| v.z.atan2(v.x.hypot(v.y))),
-        fell_at: fall.fell_at,
-        support_slip: around.map(|(_, side)| record.slip(&robot, side.other(), &mut data)),
-        groups: group_peaks(&robot, &peaks),
-        limit_violations: violations(&robot, &peaks),
-        segments: around.map_or_else(Vec::new, |(impact, side)| {
-            record.segment_peaks(&robot, side, impact.time, settings.direction, &mut data)
-        }),
-        impact,
-        audit,
-        ball_end,
-        record,
-    })
+    if let Some(record) = record {
+        record.steps = world.take_steps();
+    }
+    let (finished, ball_end, peaks) = (watch.is_free(world.time()), world.ball().position, world.peaks().to_vec());
+    Ok(Course { touches: watch.touches(world, data), finished, fell_at: fall.fell_at, peaks, ball_end })
 }
 
 /// Angle in (-pi, pi].
@@ -277,43 +356,6 @@ fn kicking_side(robot: &Robot, link: &str) -> Option<Side> {
             robot.link_name(body) == link
         })
     })
-}
-
-/// The last commands and states before and during the impact, for the re-run.
-struct RerunLog {
-    entries: VecDeque<(Snapshot, f64, JointCommand)>,
-}
-
-impl RerunLog {
-    fn new() -> Self {
-        Self { entries: VecDeque::new() }
-    }
-
-    fn note(&mut self, world: &World, command: &JointCommand, watch: &ImpactWatch) {
-        if watch.is_over(world.time()) {
-            return;
-        }
-        self.entries.push_back((world.snapshot(), world.time(), command.clone()));
-        if watch.started().is_none() {
-            while self.entries.get(1).is_some_and(|(_, time, _)| *time <= world.time() - RERUN_LEAD) {
-                self.entries.pop_front();
-            }
-        }
-    }
-
-    /// Runs the logged commands again from the oldest state at a tenth of the near step.
-    fn rerun(&self, world: &mut World, data: &mut RobotData) -> Result<Option<Impact>, SimError> {
-        let Some((start, _, _)) = self.entries.front() else { return Ok(None) };
-        let settings = *world.settings();
-        let fine = Step { near: settings.step.near / 10.0, near_distance: 10.0, ..settings.step };
-        world.restore(start)?;
-        world.set_step(fine);
-        let mut watch = ImpactWatch::new();
-        let result = self.entries.iter().try_for_each(|(_, _, command)| world.advance(command, Some(&mut watch)));
-        world.set_step(settings.step);
-        result?;
-        Ok(watch.impact(world.robot(), &settings.ball, data))
-    }
 }
 
 /// Watches for a fall: the body on the ground, the base too low or tilted too far.
@@ -422,7 +464,7 @@ impl Record {
     }
 }
 
-fn group_peaks(robot: &Robot, peaks: &[crate::world::JointPeak]) -> Vec<GroupPeak> {
+fn group_peaks(robot: &Robot, peaks: &[JointPeak]) -> Vec<GroupPeak> {
     let mut groups = Vec::with_capacity(robot.groups.len());
     for (g, group) in robot.groups.iter().enumerate() {
         let members = || robot.joints.iter().zip(peaks).filter(|(joint, _)| joint.group == g);
@@ -442,7 +484,7 @@ fn group_peaks(robot: &Robot, peaks: &[crate::world::JointPeak]) -> Vec<GroupPea
     groups
 }
 
-fn violations(robot: &Robot, peaks: &[crate::world::JointPeak]) -> Vec<LimitViolation> {
+fn violations(robot: &Robot, peaks: &[JointPeak]) -> Vec<LimitViolation> {
     let mut found = Vec::new();
     for (joint, peak) in robot.joints.iter().zip(peaks) {
         let mut add = |quantity, peak, limit, time| {

@@ -16,9 +16,12 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::SimError;
 use crate::impact::ImpactWatch;
-use crate::model::{BALL, FLOOR, build, foot_links};
+use crate::model::{BALL, FLOOR, build, foot_links, solid_geoms};
+use crate::sensors::orientation;
 use crate::settings::{Fidelity, WorldSettings};
 
+/// How deep the ball may be in something at the start, m: what its own weight presses it in, and a little more.
+const OVERLAP: f64 = 1e-3;
 /// Far steps before a possible contact from which the near step holds: one that is taken, one by which what MuJoCo last
 /// computed is late, and one for what speeds up meanwhile.
 const NEAR_STEPS: f64 = 3.0;
@@ -57,24 +60,18 @@ pub struct JointPeak {
     pub speed_time: f64,
 }
 
-/// All that is needed to go on from an instant.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Snapshot {
-    state: Vec<f64>,
-    drives: Option<Drives>,
-    time: f64,
-    work: f64,
-}
-
 /// Robot, pitch and ball.
 pub struct World {
     robot: Arc<Robot>,
     settings: WorldSettings,
     data: MjData<Box<MjModel>>,
     ball_geom: usize,
+    ball_body: usize,
     floor_geom: usize,
     /// Striking geoms as (geom, bounding radius).
     strike: Vec<(usize, f64)>,
+    /// Geoms that the ball cannot be inside of: the robot's and the ground.
+    obstacles: Vec<usize>,
     /// For each geom of the world: the contact point that it is, if any.
     contact_of_geom: Vec<Option<usize>>,
     /// For each geom of the world: whether it belongs to the robot's body above the feet.
@@ -83,8 +80,36 @@ pub struct World {
     drives: Option<Drives>,
     peaks: Vec<JointPeak>,
     time: f64,
-    work: f64,
+    motor_work: f64,
+    /// Force on the base link's centre of mass, N.
+    push: Vector3<f64>,
+    push_work: f64,
     near: bool,
+    steps: Option<Steps>,
+}
+
+/// Every physics step of a trial, for a program of its own to do again: `tools/replay.py`.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Steps {
+    /// For each step its length (s), positions and speeds of the whole world before it, forces on its degrees of freedom, and
+    /// force and moment on the base link and on the ball (N, N m, world frame).
+    pub rows: Vec<f64>,
+    /// Positions and speeds after the last one.
+    pub end: Vec<f64>,
+    /// Numbers in a row.
+    pub width: usize,
+}
+
+/// A contact of the ball with the robot.
+pub(crate) struct Strike {
+    /// Body index of the link.
+    pub(crate) link: usize,
+    /// Where, m.
+    pub(crate) point: Vector3<f64>,
+    /// On the ball, N.
+    pub(crate) force: Vector3<f64>,
+    /// How deep the two are in one another, m.
+    pub(crate) depth: f64,
 }
 
 impl std::fmt::Debug for World {
@@ -122,6 +147,11 @@ impl World {
             let id = world_geom(robot_geom)?;
             strike.push((id, model.geom_rbound()[id]));
         }
+        let mut obstacles = vec![floor_geom];
+        for robot_geom in solid_geoms(&robot) {
+            obstacles.push(world_geom(robot_geom)?);
+        }
+        let ball_body = usize::try_from(model.geom_bodyid()[ball_geom]).unwrap_or(0);
         let geoms = model.geom_bodyid().len();
         let mut contact_of_geom = vec![None; geoms];
         for (i, contact) in robot.contacts.iter().enumerate() {
@@ -144,14 +174,19 @@ impl World {
             settings: *settings,
             data: MjData::try_new(Box::new(model)).map_err(|e| refused(e.to_string()))?,
             ball_geom,
+            ball_body,
             floor_geom,
             strike,
+            obstacles,
             contact_of_geom,
             is_body,
             peaks: vec![JointPeak::default(); joints],
             time: 0.0,
-            work: 0.0,
+            motor_work: 0.0,
+            push: Vector3::zeros(),
+            push_work: 0.0,
             near: false,
+            steps: None,
         };
         let stand = world.robot.stand.clone();
         let still = vec![0.0; world.robot.nv()];
@@ -189,9 +224,26 @@ impl World {
         }
         self.peaks.fill(JointPeak::default());
         self.time = 0.0;
-        self.work = 0.0;
+        self.motor_work = 0.0;
+        self.push = Vector3::zeros();
+        self.push_work = 0.0;
         self.near = self.is_near();
+        if let Some(steps) = &mut self.steps {
+            *steps = Steps::default();
+        }
         Ok(())
+    }
+
+    /// Keeps every physics step from the next reset on, until they are taken.
+    pub fn keep_steps(&mut self) {
+        self.steps = Some(Steps::default());
+    }
+
+    /// The steps since the last reset, where they were kept; no more are.
+    pub fn take_steps(&mut self) -> Option<Steps> {
+        let mut steps = self.steps.take()?;
+        steps.end = [self.data.qpos(), self.data.qvel()].concat();
+        Some(steps)
     }
 
     /// Advances one tick under `command`, in far steps, or near ones while the ball is near; tells `watch` of every step.
@@ -223,6 +275,7 @@ impl World {
     pub fn push(&mut self, force: [f64; 3]) {
         let base = self.robot.base;
         self.data.xfrc_applied_mut()[base][..3].copy_from_slice(&force);
+        self.push = force.into();
     }
 
     /// Puts the ball where `ball` says, as a hand or another player would.
@@ -239,6 +292,11 @@ impl World {
 
     /// One physics step of `dt` (s).
     fn step(&mut self, command: &JointCommand, dt: f64) -> Result<(), SimError> {
+        self.drag_ball();
+        let pushed = self.push != Vector3::zeros();
+        if pushed {
+            self.push_work += 0.5 * dt * self.push.dot(&self.base_com_velocity());
+        }
         let joints = &self.robot.joints;
         let (mut torque_sum, mut load) = (0.0, 0.0);
         for (i, joint) in joints.iter().enumerate() {
@@ -259,7 +317,7 @@ impl World {
             };
             load += torque.abs();
             torque_sum += torque;
-            self.work += 0.5 * dt * torque * v;
+            self.motor_work += 0.5 * dt * torque * v;
             self.data.qfrc_applied_mut()[6 + i] = torque;
             let peak = &mut self.peaks[i];
             if torque.abs() > peak.torque {
@@ -275,6 +333,18 @@ impl World {
         if !torque_sum.is_finite() {
             return Err(SimError::Diverged { time: self.time, what: "a joint torque" });
         }
+        if let Some(mut steps) = self.steps.take() {
+            let before = steps.rows.len();
+            steps.rows.push(dt);
+            for part in [self.data.qpos(), self.data.qvel(), self.data.qfrc_applied()] {
+                steps.rows.extend_from_slice(part);
+            }
+            for body in [self.robot.base, self.ball_body] {
+                steps.rows.extend_from_slice(&self.data.xfrc_applied()[body]);
+            }
+            steps.width = steps.rows.len() - before;
+            self.steps = Some(steps);
+        }
         self.data.model_opt_mut().timestep = dt;
         self.data.step();
         self.time += dt;
@@ -283,12 +353,30 @@ impl World {
         for i in 6..6 + joints.len() {
             let v = self.data.qvel()[i];
             speed_sum += v;
-            self.work += 0.5 * dt * self.data.qfrc_applied()[i] * v;
+            self.motor_work += 0.5 * dt * self.data.qfrc_applied()[i] * v;
+        }
+        if pushed {
+            self.push_work += 0.5 * dt * self.push.dot(&self.base_com_velocity());
         }
         if !(speed_sum + self.data.qpos()[2]).is_finite() {
             return Err(SimError::Diverged { time: self.time, what: "a joint speed" });
         }
         Ok(())
+    }
+
+    /// Puts the air's force on the ball, as of its present velocity.
+    fn drag_ball(&mut self) {
+        let velocity = self.ball().velocity;
+        let damping = self.settings.ball.air_damping(Vector3::from(velocity).norm());
+        self.data.xfrc_applied_mut()[self.ball_body][..3].copy_from_slice(&velocity.map(|v| -damping * v));
+    }
+
+    /// Velocity of the base link's centre of mass, m/s.
+    fn base_com_velocity(&self) -> Vector3<f64> {
+        let v = self.v();
+        let centre = Vector3::from(self.data.model().body_ipos()[self.robot.base]);
+        let spin = orientation(self.q()) * Vector3::new(v[3], v[4], v[5]).cross(&centre);
+        Vector3::new(v[0], v[1], v[2]) + spin
     }
 
     /// Whether the gap between the ball and a striking geom is under the near distance and what they approach each other
@@ -330,7 +418,36 @@ impl World {
     /// Work that the motors have done since the last reset, J.
     #[must_use]
     pub fn motor_work(&self) -> f64 {
-        self.work
+        self.motor_work
+    }
+
+    /// Work that pushes have done since the last reset, J.
+    #[must_use]
+    pub fn push_work(&self) -> f64 {
+        self.push_work
+    }
+
+    /// Kinetic and potential energy (J) of robot and ball in a state, which becomes the world's.
+    pub(crate) fn energy(&mut self, q: &[f64], v: &[f64], ball: &BallState) -> [f64; 2] {
+        let (nq, nv) = (self.robot.nq(), self.robot.nv());
+        self.data.qpos_mut()[..nq].copy_from_slice(q);
+        self.data.qvel_mut()[..nv].copy_from_slice(v);
+        self.place_ball(ball);
+        self.data.energy_pos();
+        self.data.energy_vel();
+        let [potential, kinetic] = *self.data.energy();
+        [kinetic, potential]
+    }
+
+    /// A part of the robot, or the ground, that the ball is inside of, and how deep (m).
+    pub(crate) fn ball_overlap(&mut self) -> Option<(String, f64)> {
+        let (ball, radius) = (self.ball_geom, self.settings.ball.radius);
+        let data = &mut self.data;
+        let deepest = self.obstacles.iter().map(|&geom| (geom, -data.geom_distance(geom, ball, radius, None)));
+        let (geom, depth) = deepest.max_by(|a, b| a.1.total_cmp(&b.1))?;
+        let body = usize::try_from(self.data.model().geom_bodyid()[geom]).unwrap_or(0);
+        let name = if body == 0 { "the ground" } else { self.robot.link_name(body) };
+        (depth > OVERLAP).then(|| (name.to_owned(), depth))
     }
 
     /// The robot's position, 7 + n.
@@ -413,9 +530,8 @@ impl World {
         (self.data.xpos()[link].into(), Matrix3::from_row_slice(&self.data.xmat()[link]))
     }
 
-    /// Every contact of the ball with the robot in the last step: body index of the link, point (m) and force on the
-    /// ball (N) in the world.
-    pub(crate) fn ball_strikes(&self) -> impl Iterator<Item = (usize, Vector3<f64>, Vector3<f64>)> {
+    /// Every contact of the ball with the robot in the last step.
+    pub(crate) fn ball_strikes(&self) -> impl Iterator<Item = Strike> {
         self.data.contact().iter().enumerate().filter_map(|(i, contact)| {
             let [a, b] = contact.geom.map(|geom| usize::try_from(geom).unwrap_or(usize::MAX));
             if a == self.floor_geom || b == self.floor_geom {
@@ -427,34 +543,9 @@ impl World {
                 _ => return None,
             };
             let link = usize::try_from(self.data.model().geom_bodyid()[striker]).ok()?;
-            Some((link, Vector3::from(contact.pos), contact_force(&self.data, i) * sign))
+            let force = contact_force(&self.data, i) * sign;
+            Some(Strike { link, point: contact.pos.into(), force, depth: -contact.dist })
         })
-    }
-
-    /// The present state, to come back to.
-    #[must_use]
-    pub fn snapshot(&self) -> Snapshot {
-        Snapshot {
-            state: self.data.state(MjtState::mjSTATE_INTEGRATION as u32).into_vec(),
-            drives: self.drives.clone(),
-            time: self.time,
-            work: self.work,
-        }
-    }
-
-    /// Goes back to `snapshot`, which a world of the same robot and settings has made.
-    ///
-    /// # Errors
-    /// When the snapshot is of another world.
-    pub fn restore(&mut self, snapshot: &Snapshot) -> Result<(), SimError> {
-        self.data
-            .set_state(&snapshot.state, MjtState::mjSTATE_INTEGRATION as u32)
-            .map_err(|e| SimError::State { found: e.to_string(), expected: "a snapshot of this world".into() })?;
-        self.data.forward();
-        self.drives.clone_from(&snapshot.drives);
-        self.time = snapshot.time;
-        self.work = snapshot.work;
-        Ok(())
     }
 
     /// Changes the time steps; for a re-run in finer ones.
@@ -487,4 +578,39 @@ fn contact_force(data: &MjData<Box<MjModel>>, i: usize) -> Vector3<f64> {
     let frame = &data.contact()[i].frame;
     let axis = |k: usize| Vector3::new(frame[3 * k], frame[3 * k + 1], frame[3 * k + 2]);
     axis(0) * local[0] + axis(1) * local[1] + axis(2) * local[2]
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+mod tests {
+    use super::*;
+
+    /// In the air, where nothing else does work, what the motors do is what robot and ball gain of energy.
+    #[test]
+    fn the_motors_work_is_the_energy_that_a_floating_robot_gains() {
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots/prestoe");
+        let robot = Arc::new(Robot::load(&folder).unwrap());
+        let mut world = World::new(Arc::clone(&robot), &WorldSettings::default()).unwrap();
+        let mut q = robot.stand.clone();
+        q[2] += 3.0;
+        world.reset(&q, &vec![0.0; robot.nv()], &BallState::at_rest([9.0, 0.0, 0.11])).unwrap();
+        let still = world.ball();
+        let [kinetic, potential] = world.energy(&q, &vec![0.0; robot.nv()], &still);
+        let before = kinetic + potential;
+        world.reset(&q, &vec![0.0; robot.nv()], &still).unwrap();
+        let mut command = JointCommand::zeros(robot.joints.len());
+        command.positions.copy_from_slice(&q[7..]);
+        // Both arms and one leg swing out.
+        for name in ["left_elbow", "right_elbow", "left_hip_pitch"] {
+            command.positions[robot.joint_index(name).unwrap()] -= 0.8;
+        }
+        for _ in 0..60 {
+            world.advance(&command, None).unwrap();
+        }
+        let (q, v, work) = (world.q().to_vec(), world.v().to_vec(), world.motor_work());
+        let [kinetic, potential] = world.energy(&q, &v, &still);
+        let gained = kinetic + potential - before;
+        assert!(work > 1.0, "{work} J");
+        assert!((gained / work - 1.0).abs() < 0.05, "{gained} J gained, {work} J of work");
+    }
 }

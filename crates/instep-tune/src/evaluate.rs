@@ -103,7 +103,7 @@ pub struct Summary {
     pub good: usize,
     /// Requests refused.
     pub refused: usize,
-    /// Kicks that missed.
+    /// Kicks that missed, or hardly moved the ball.
     pub missed: usize,
     /// Kicks that fell.
     pub fell: usize,
@@ -125,9 +125,9 @@ impl Summary {
             median: instep_bench::table::quantile(good.clone(), 0.5),
             good: good.len(),
             refused: cases - kicked().count(),
-            missed: kicked().filter(|k| !k.hit).count(),
+            missed: kicked().filter(|k| !k.hit && !k.audit_invalid).count(),
             fell: kicked().filter(|k| !k.upright).count(),
-            invalid: kicked().filter(|k| k.audit_invalid && k.hit).count(),
+            invalid: kicked().filter(|k| k.audit_invalid).count(),
         }
     }
 
@@ -148,9 +148,9 @@ impl Summary {
     }
 }
 
-/// Whether a kick counts.
+/// Whether a kick counts: a hit has passed the audit.
 fn counts(kicked: &Kicked) -> bool {
-    kicked.hit && kicked.upright && !kicked.audit_invalid
+    kicked.hit && kicked.upright
 }
 
 /// What settings are measured on.
@@ -218,9 +218,8 @@ impl Judge<'_> {
                 Ok(speed) => case.request.strength = Strength::BallSpeed(speed),
                 Err(refusal) => return Ok(refused(refusal.name())),
             }
-            engine = subject.engine(self.engine)?;
         }
-        let (outcome, _, ran) = run_case(subject, &case, engine.as_mut(), world, &mut Vec::new())?;
+        let (outcome, _, ran) = run_case(subject, self.engine, &case, world, &mut Vec::new())?;
         Ok(match outcome {
             Err(refusal) => refused(refusal.name()),
             Ok(kicked) if counts(&kicked) => Tried { cost: self.objective.cost(&kicked), outcome: Ok(kicked) },

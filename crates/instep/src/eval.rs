@@ -6,6 +6,9 @@ use std::sync::Arc;
 
 use clap::Args;
 use instep_learn::evaluate::{Evaluation, Summary, evaluate};
+use instep_sim::NamedRate;
+use instep_sim::settings::Change;
+use serde::Serialize;
 
 use crate::failure::Failure;
 use crate::output::{self, Output, Paint};
@@ -33,6 +36,14 @@ pub(crate) struct Eval {
     threads: Option<usize>,
 }
 
+/// What `--json` prints.
+#[derive(Debug, Serialize)]
+struct Shown<'a> {
+    #[serde(flatten)]
+    summary: &'a Summary,
+    world_changes: &'a [Change],
+}
+
 impl Eval {
     /// Runs the command.
     ///
@@ -45,13 +56,18 @@ impl Eval {
         train::threads(self.threads)?;
         let policy = train::policy(&self.policy)?;
         let robot = Arc::new(places::robot(&policy.header.robot)?);
-        let world = self.world.as_deref().map(kick::world_settings).transpose()?.unwrap_or_default();
+        let default = kick::default_world(&robot)?;
+        let world = kick::world_settings(self.world.as_deref(), &default)?;
+        let world_changes = world.changes(&default);
         let evaluation =
             Evaluation { trials: self.trials, seed: self.seed, start: self.start, world, ..Evaluation::default() };
         let bar = output::bar(self.trials as u64, "{wide_bar} {pos}/{len} trials {eta}");
         let summary = evaluate(&robot, &policy, &evaluation, &|| bar.inc(1))?;
         bar.finish_and_clear();
-        output.show(&summary, |paint| text(&summary, paint))?;
+        output.show(&Shown { summary: &summary, world_changes: &world_changes }, |paint| {
+            let changes = world_changes.iter().map(|change| paint.bad(&format!("\nnot the default world: {change}")));
+            text(&summary, paint) + &changes.collect::<String>()
+        })?;
         Ok(ExitCode::SUCCESS)
     }
 }
@@ -59,15 +75,20 @@ impl Eval {
 fn text(summary: &Summary, paint: Paint) -> String {
     let row = |label: &str, value: String| format!("  {} {value}", paint.faint(&format!("{label:<18}")));
     let or_none = |value: Option<f64>, unit: &str| value.map_or("none".into(), |v| format!("{v:.2} {unit}"));
-    let share = |value: f64| format!("{:.0} %", 100.0 * value);
+    let share = |rate: &NamedRate| {
+        rate.rate.map_or("none".into(), |r| {
+            format!("{:.0} % ({:.0} to {:.0})", 100.0 * r.share, 100.0 * r.low, 100.0 * r.high)
+        })
+    };
     [
-        format!("{} trials", summary.trials),
-        row("to the clip's end", share(summary.completed_rate)),
+        format!("{} trials; in brackets the 95 % interval of each share", summary.trials),
+        row("to the clip's end", share(&summary.completed)),
         row("link error", format!("{:.3} \u{b1} {:.3} m", summary.link_error_mean, summary.link_error_deviation)),
-        row("ball hit", share(summary.hit_rate)),
+        row("ball hit", share(&summary.hit)),
         row("ball speed", format!("{} (median of the valid)", or_none(summary.ball_speed_median, "m/s"))),
         row("direction error", format!("{} (median)", or_none(summary.direction_error_median_deg, "deg"))),
-        row("upright", share(summary.upright_rate)),
+        row("upright", share(&summary.upright)),
+        row("converged", format!("{}, run again at a quarter of the step", share(&summary.converged))),
         row("audit refused", summary.audit_invalid.to_string()),
         row("limits passed", summary.limit_violations.to_string()),
     ]

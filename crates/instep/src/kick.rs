@@ -3,7 +3,10 @@
 mod engine;
 mod page;
 mod recording;
+mod steps;
 mod summary;
+
+pub(crate) use page::page;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -11,14 +14,16 @@ use std::sync::Arc;
 
 use clap::Args;
 use instep_kick::policy::PolicyKick;
-use instep_kick::{KickPlan, KickRequest, Playback, Strength};
+use instep_kick::{BallModel, KickPlan, KickRequest, Playback, Settings, Strength};
 use instep_motion::phase::Side;
 use instep_motion::reference::{Reference, ReferenceKind};
 use instep_robot::Robot;
 use instep_robot::control::Controller;
-use instep_sim::BallState;
-use instep_sim::settings::WorldSettings;
+use instep_sim::audit::Rerun;
+use instep_sim::impact::Impact;
+use instep_sim::settings::{Change, WorldSettings};
 use instep_sim::trial::{self, Trial, TrialSettings};
+use instep_sim::{BallState, World};
 use serde::Serialize;
 
 use crate::failure::Failure;
@@ -71,6 +76,10 @@ pub(crate) struct Kick {
     /// With --engine: a file of requests (a JSON array, or one JSON object a line) in place of --ball; writes no report
     #[arg(long, value_name = "FILE", requires = "engine", conflicts_with_all = ["ball", "direction", "speed"])]
     requests: Option<PathBuf>,
+    /// Also writes model.mjb, steps.json and steps.f64 into this folder: every physics step of one kick, which tools/replay.py
+    /// does again in MuJoCo's own Python
+    #[arg(long, value_name = "FOLDER", conflicts_with = "requests")]
+    steps: Option<PathBuf>,
     /// Constants of the world, as TOML; what is absent keeps its default
     #[arg(long, value_name = "FILE")]
     world: Option<PathBuf>,
@@ -97,17 +106,19 @@ pub(crate) fn degrees(text: &str) -> Result<f64, String> {
 }
 
 /// Everything about one kick that was tried.
-struct Tried {
-    robot: Arc<Robot>,
-    source: Source,
-    settings: TrialSettings,
-    trial: Trial,
-    report: PathBuf,
-    recording: PathBuf,
+pub(crate) struct Tried {
+    pub(crate) robot: Arc<Robot>,
+    pub(crate) source: Source,
+    pub(crate) settings: TrialSettings,
+    /// What is not as in the robot's default world.
+    pub(crate) world_changes: Vec<Change>,
+    pub(crate) trial: Trial,
+    pub(crate) report: PathBuf,
+    pub(crate) recording: PathBuf,
 }
 
 /// What a kick came from.
-enum Source {
+pub(crate) enum Source {
     /// A reference.
     Followed(Arc<Followed>),
     /// A request to an engine.
@@ -115,7 +126,7 @@ enum Source {
 }
 
 /// A reference that was followed.
-struct Followed {
+pub(crate) struct Followed {
     reference: Arc<Reference>,
     file: PathBuf,
     /// The policy's file, where one ran.
@@ -130,7 +141,6 @@ impl Kick {
     /// # Errors
     /// When something handed in cannot be used or the simulation diverges. How the kick went is no error.
     pub(crate) fn run(self, output: &Output) -> Result<ExitCode, Failure> {
-        let world = self.world.as_deref().map(world_settings).transpose()?.unwrap_or_default();
         if let Some(name) = &self.engine {
             return self.on_request(name, output);
         }
@@ -142,7 +152,9 @@ impl Kick {
                 (self.with_policy(&file)?, Some(file))
             }
         };
-        let Ready { robot, reference, reference_file, start, mut controller, q, v } = ready;
+        let Ready { robot, reference, reference_file, start, mut controller, mut twin, q, v } = ready;
+        let default = default_world(&robot)?;
+        let world = world_settings(self.world.as_deref(), &default)?;
         let phases = &reference.phases;
         let until = reference.duration().max(phases.t_impact + AFTERMATH);
         let duration = self.duration.unwrap_or(until - start);
@@ -166,10 +178,18 @@ impl Kick {
             ball: BallState::at_rest([x, y, world.ball.radius]),
             direction: 0.0,
         };
-        let trial = trial::run(&robot, &settings, controller.as_mut())?;
+        let mut room = World::new(Arc::clone(&robot), &settings.world)?;
+        if let Some(folder) = &self.steps {
+            steps::prepare(folder, &mut room)?;
+        }
+        let trial = trial::run_in(&mut room, &settings, controller.as_mut(), twin.as_mut())?;
+        if let Some(folder) = &self.steps {
+            steps::write(folder, &mut room, &trial)?;
+        }
         let followed = Arc::new(Followed { reference, file: reference_file, policy, start });
         let source = Source::Followed(Arc::clone(&followed));
-        let tried = Tried { robot, source, settings, trial, report, recording };
+        let world_changes = world.changes(&default);
+        let tried = Tried { robot, source, settings, world_changes, trial, report, recording };
         tried.write()?;
         output.show(&Measures::new(&tried, &followed), |paint| summary::text(&tried, paint))?;
         Ok(ExitCode::SUCCESS)
@@ -184,6 +204,8 @@ struct Ready {
     /// Where in the reference it starts, s.
     start: f64,
     controller: Box<dyn Controller>,
+    /// The same again, for the audit's re-run.
+    twin: Box<dyn Controller>,
     q: Vec<f64>,
     v: Vec<f64>,
 }
@@ -195,10 +217,13 @@ impl Kick {
         let reference = Arc::new(Reference::load(&reference_file)?);
         let robot = Arc::new(places::robot(self.robot.as_deref().unwrap_or(&reference.robot))?);
         let start = self.start.unwrap_or(reference.phases.t_plant);
-        let engine = Playback::new(&robot, Arc::clone(&reference), start)
-            .map_err(|error| Failure::from(error).about(reference_file.display()))?;
+        let engine = || {
+            Playback::new(&robot, Arc::clone(&reference), start)
+                .map_err(|error| Failure::from(error).about(reference_file.display()))
+        };
+        let (engine, twin) = (engine()?, Box::new(engine()?));
         let (q, v) = engine.initial_state();
-        Ok(Ready { robot, reference, reference_file, start, controller: Box::new(engine), q, v })
+        Ok(Ready { robot, reference, reference_file, start, controller: Box::new(engine), twin, q, v })
     }
 
     /// Runs a policy.
@@ -209,10 +234,12 @@ impl Kick {
         let reference_file = PathBuf::from(&policy.header.reference);
         let from = policy.header.window[0];
         let start = self.start.unwrap_or(from);
-        let engine = PolicyKick::new(&robot, &policy, start - from)
-            .map_err(|error| Failure::from(error).about(file.display()))?;
+        let engine = || {
+            PolicyKick::new(&robot, &policy, start - from).map_err(|error| Failure::from(error).about(file.display()))
+        };
+        let (engine, twin) = (engine()?, Box::new(engine()?));
         let (q, v) = engine.initial_state();
-        Ok(Ready { robot, reference, reference_file, start, controller: Box::new(engine), q, v })
+        Ok(Ready { robot, reference, reference_file, start, controller: Box::new(engine), twin, q, v })
     }
 
     /// Kicks on request.
@@ -225,8 +252,9 @@ impl Kick {
             (Some(file), _) => engine::load(file)?,
             (None, ball) => vec![self.request(ball, subject.engine(engine)?.own_start().map(|start| start.request))?],
         };
-        let world = self.world.as_deref().map(world_settings).transpose()?;
-        engine::run(&subject, engine, &requests, world, self.seed, &self.out, output)
+        let world = world_settings(self.world.as_deref(), &subject.world())?;
+        let folders = engine::Folders { out: &self.out, steps: self.steps.as_deref() };
+        engine::run(&subject, engine, &requests, world, self.seed, folders, output)
     }
 }
 
@@ -245,18 +273,44 @@ impl Kick {
     }
 }
 
-/// Reads and checks the constants of the world.
-pub(crate) fn world_settings(path: &Path) -> Result<WorldSettings, Failure> {
-    let settings: WorldSettings = places::settings("--world", path, "constants of the world")?;
+/// The world in which a robot is measured unless another is asked for: with the ball that it plays, where its folder has one.
+pub(crate) fn default_world(robot: &Robot) -> Result<WorldSettings, Failure> {
+    if !robot.folder().join(BallModel::FILE).exists() {
+        return Ok(WorldSettings::default());
+    }
+    Ok(instep_bench::engines::world(&BallModel::load(robot.folder())?))
+}
+
+/// The constants of the world: those of the file, where there is one, in place of the `default` ones.
+pub(crate) fn world_settings(path: Option<&Path>, default: &WorldSettings) -> Result<WorldSettings, Failure> {
+    let Some(path) = path else { return Ok(*default) };
+    // Read as it stands first, so that an error has its line.
+    let _: WorldSettings = places::settings("--world", path, "constants of the world")?;
+    let changes: toml::Table = places::settings("--world", path, "constants of the world")?;
+    let mut table = toml::Table::try_from(default).map_err(Failure::other)?;
+    overlay(&mut table, changes);
+    let settings: WorldSettings = table.try_into().map_err(|e| Failure::input(e).about(path.display()))?;
     settings.validate().map_err(|e| Failure::from(e).about(path.display()))?;
     Ok(settings)
+}
+
+/// Puts every value of `changes` in its place in `table`.
+fn overlay(table: &mut toml::Table, changes: toml::Table) {
+    for (key, value) in changes {
+        match (table.get_mut(&key), value) {
+            (Some(toml::Value::Table(inner)), toml::Value::Table(changes)) => overlay(inner, changes),
+            (_, value) => {
+                table.insert(key, value);
+            }
+        }
+    }
 }
 
 impl Tried {
     /// Writes report and recording, both or neither.
     fn write(&self) -> Result<(), Failure> {
         let mut batch = files::Batch::default();
-        page::page(self).save(batch.stage(&self.report)?)?;
+        page(self).save(batch.stage(&self.report)?)?;
         recording::recording(self)?.save(batch.stage(&self.recording)?)?;
         batch.commit()
     }
@@ -310,7 +364,7 @@ impl Followed {
 /// What `--json` prints. Keys are stable: they may be added to, never renamed. SI units; degrees where the key says so.
 #[derive(Debug, Serialize)]
 struct Measures<'a> {
-    /// m/s; null when the ball was not touched. To be believed only if `audit` is "valid".
+    /// m/s, as the ball leaves the robot for good; null when it was not touched. To be believed only if `audit` is "valid".
     ball_speed: Option<f64>,
     /// From the wanted to the real direction, positive to the left.
     direction_error_deg: Option<f64>,
@@ -326,9 +380,16 @@ struct Measures<'a> {
     impact_time: Option<f64>,
     contact_time: Option<f64>,
     contact_link: Option<&'a str>,
+    /// How many.
     touches: usize,
+    /// Each of them.
+    touch_list: &'a [Impact],
+    /// Whether the whole kick, run again at a quarter of the step, led to the same.
+    converged: bool,
+    rerun: Option<Rerun>,
     rerun_ball_speed: Option<f64>,
     energy_gain: Option<f64>,
+    world_changes: &'a [Change],
     support_slip: Option<f64>,
     ball_start: [f64; 3],
     ball_end: [f64; 3],
@@ -352,7 +413,7 @@ impl<'a> Measures<'a> {
         let (trial, settings) = (&tried.trial, &tried.settings);
         let impact = trial.impact.as_ref();
         Self {
-            ball_speed: impact.map(|i| i.ball_speed()),
+            ball_speed: trial.ball_speed,
             direction_error_deg: trial.direction_error.map(f64::to_degrees),
             launch_angle_deg: trial.launch_angle.map(f64::to_degrees),
             foot_speed: impact.map(|i| i.foot_speed),
@@ -366,8 +427,12 @@ impl<'a> Measures<'a> {
             impact_time: impact.map(|i| i.time),
             contact_time: impact.map(|i| i.duration),
             contact_link: impact.map(|i| i.link.as_str()),
-            touches: impact.map_or(0, |i| i.touches),
-            rerun_ball_speed: trial.audit.rerun_ball_speed,
+            touches: trial.touches.len(),
+            touch_list: &trial.touches,
+            converged: trial.audit.converged,
+            rerun: trial.audit.rerun,
+            rerun_ball_speed: trial.audit.rerun.and_then(|rerun| rerun.ball_speed),
+            world_changes: &tried.world_changes,
             energy_gain: trial.audit.energy_gain,
             support_slip: trial.support_slip,
             ball_start: settings.ball.position,

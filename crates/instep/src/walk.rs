@@ -101,7 +101,7 @@ impl Walk {
         let settings = WalkSettings::load(&robot)?;
         let report = self.out.join("report.html");
         files::check_file(&report)?;
-        let world = self.world.as_deref().map_or_else(|| Ok(WorldSettings::default()), world_settings)?;
+        let world = world_settings(self.world.as_deref(), &WorldSettings::default())?;
         let wanted = self.velocity.map(|[x, y, turn]| Velocity { x, y, turn });
         let asked = match (wanted, self.to) {
             (_, Some(goal)) => Asked::Goal(goal),

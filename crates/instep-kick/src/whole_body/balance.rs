@@ -136,6 +136,19 @@ mod tests {
     }
 
     #[test]
+    fn each_gain_acts_with_its_own_sign() {
+        let out = |p: f64, i: f64, d: f64| {
+            let mut pid = PidState::new(Pid { p, i, d, limit: 1.0 });
+            pid.step(0.01, 0.01);
+            pid.step(0.03, 0.01)
+        };
+        // Error 0.03, its integral 0.0004, its rate 2: an error that grows is answered with more, not with less.
+        assert!((out(0.5, 0.0, 0.0) - 0.015).abs() < 1e-12);
+        assert!((out(0.0, 50.0, 0.0) - 0.02).abs() < 1e-12);
+        assert!((out(0.0, 0.0, 0.1) - 0.2).abs() < 1e-12);
+    }
+
+    #[test]
     fn a_lean_forward_moves_the_body_back() {
         let pid = Pid { p: 0.3, i: 0.5, d: 0.0, limit: 0.02 };
         let on = Feedback {

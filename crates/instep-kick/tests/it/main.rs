@@ -3,6 +3,7 @@
 
 mod allocation;
 mod cancel;
+mod catch;
 mod issue_304;
 mod kinematics;
 mod learned;

@@ -54,8 +54,10 @@ impl Rig {
         let engine = engine(name);
         let robot = robot(name);
         let model = *engine.ball();
-        let settings =
-            WorldSettings { ball: Ball { mass: model.mass, radius: model.radius }, ..WorldSettings::default() };
+        let settings = WorldSettings {
+            ball: Ball { mass: model.mass, radius: model.radius, ..Ball::default() },
+            ..WorldSettings::default()
+        };
         let mut world = World::new(Arc::clone(&robot), &settings).unwrap();
         let foot = engine.footprint_from_base();
         let at = [ball[0] - foot[0], ball[1] - foot[1], model.radius];

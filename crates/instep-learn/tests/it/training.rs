@@ -192,9 +192,9 @@ fn an_evaluation_is_the_same_twice_and_counts_what_it_says() {
     assert_eq!(first.each.len(), 3);
     // Nothing was learned yet: it does not get through the run-up, and that is told.
     assert!(first.each.iter().all(|tried| tried.upright == tried.fell_at.is_none()), "{first:?}");
-    assert!(first.completed_rate < 1.0 && first.upright_rate < 1.0, "{first:?}");
+    assert!(first.completed.share() < Some(1.0) && first.upright.share() < Some(1.0), "{first:?}");
     let upright = first.each.iter().filter(|tried| tried.upright).count() as f64 / 3.0;
-    assert_eq!(first.upright_rate, upright);
+    assert_eq!(first.upright.share(), Some(upright));
     assert!(first.link_error_mean > 0.0);
 }
 

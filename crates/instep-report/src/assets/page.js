@@ -20,6 +20,7 @@
   const SPEEDS = [0.05, 0.1, 0.2, 0.25, 0.5, 1, 2];
   let time = start, playing = false, speed = 1, view = null, plots = null;
 
+  if (data.matrix) createMatrix(find("matrix"), data.matrix);
   if (data.plots.length) plots = createPlots(find("plots"), data.plots, replay, t => { if (replay) { setPlaying(false); setTime(t); } });
   if (!replay) return;
 

@@ -1,6 +1,6 @@
 //! Whether the parts of a report fit together.
 
-use crate::{Axis, Plot, Replay, Report, ReportError, Samples, Shape};
+use crate::{Axis, Matrix, Plot, Replay, Report, ReportError, Samples, Shape};
 
 /// What `view.js` and its shader can draw.
 const MOST_LINES: usize = 96;
@@ -16,6 +16,9 @@ pub(crate) fn check(report: &Report) -> Result<(), ReportError> {
                 (format!("{} cells", row.len()), format!("{}, one for each column", table.columns.len()))
             })?;
         }
+    }
+    if let Some(matrix) = &report.matrix {
+        check_matrix(matrix)?;
     }
     if let Some(replay) = &report.replay {
         check_replay(replay)?;
@@ -34,6 +37,21 @@ fn ensure(
     }
     let (wrong, wanted) = wrong_and_wanted();
     Err(ReportError::Inconsistent { place: place(), wrong, wanted })
+}
+
+fn check_matrix(matrix: &Matrix) -> Result<(), ReportError> {
+    for row in &matrix.rows {
+        let place = || format!("matrix {:?}, row {:?}", matrix.title, row.name);
+        let (cells, columns) = (row.cells.len(), matrix.columns.len());
+        ensure(cells == columns, place, || (format!("{cells} cells"), format!("{columns}, one for each column")))?;
+        for cell in row.cells.iter().flatten() {
+            let (values, measures) = (cell.values.len(), matrix.measures.len());
+            ensure(values == measures, place, || {
+                (format!("{values} values"), format!("{measures}, one for each measure"))
+            })?;
+        }
+    }
+    Ok(())
 }
 
 fn check_replay(replay: &Replay) -> Result<(), ReportError> {

@@ -3,11 +3,18 @@
 use serde::Serialize;
 
 use super::text::{base64_f32, short};
-use crate::{Actor, Axis, Camera, Color, Finish, Marking, Pitch, Plot, Replay, Report, Samples, Series, Shape};
+use crate::{
+    Actor, Axis, Camera, Color, Finish, Marking, Matrix, MatrixCell, Measure, Pitch, Plot, Replay, Report, Samples,
+    Series, Shape,
+};
 
 /// The report's replay and plots.
 pub(super) fn json(report: &Report) -> String {
-    let data = Data { replay: report.replay.as_ref().map(replay), plots: report.plots.iter().map(plot).collect() };
+    let data = Data {
+        replay: report.replay.as_ref().map(replay),
+        matrix: report.matrix.as_ref().map(matrix),
+        plots: report.plots.iter().map(plot).collect(),
+    };
     // Plain structs with string keys: serde_json cannot fail on them. An empty object would leave the page's text.
     serde_json::to_string(&data).unwrap_or_else(|_| "{\"plots\":[]}".into())
 }
@@ -15,6 +22,7 @@ pub(super) fn json(report: &Report) -> String {
 #[derive(Serialize)]
 struct Data<'a> {
     replay: Option<ReplayData<'a>>,
+    matrix: Option<MatrixData<'a>>,
     plots: Vec<PlotData<'a>>,
 }
 
@@ -26,6 +34,36 @@ struct ReplayData<'a> {
     events: Vec<(f64, &'a str)>,
     pitch: Option<PitchData>,
     camera: Option<CameraData>,
+}
+
+#[derive(Serialize)]
+struct MatrixData<'a> {
+    title: &'a str,
+    measures: Vec<MeasureData<'a>>,
+    columns: &'a [String],
+    rows: Vec<MatrixRowData<'a>>,
+}
+
+#[derive(Serialize)]
+struct MeasureData<'a> {
+    name: &'a str,
+    about: &'a str,
+    shade: [f64; 2],
+    digits: usize,
+}
+
+#[derive(Serialize)]
+struct MatrixRowData<'a> {
+    name: &'a str,
+    cells: Vec<Option<MatrixCellData<'a>>>,
+}
+
+#[derive(Serialize)]
+struct MatrixCellData<'a> {
+    /// Value, low and high of each measure.
+    values: Vec<[Option<f64>; 3]>,
+    details: &'a [(String, String)],
+    links: &'a [(String, String)],
 }
 
 #[derive(Serialize)]
@@ -99,6 +137,33 @@ struct SeriesData<'a> {
     y: Option<Vec<Option<f64>>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     points: Option<Vec<[Option<f64>; 2]>>,
+}
+
+fn matrix(matrix: &Matrix) -> MatrixData<'_> {
+    fn cell(cell: &MatrixCell) -> MatrixCellData<'_> {
+        MatrixCellData {
+            values: cell.values.iter().map(|value| value.map(|number| number.and_then(short))).collect(),
+            details: &cell.details,
+            links: &cell.links,
+        }
+    }
+    MatrixData {
+        title: &matrix.title,
+        measures: matrix
+            .measures
+            .iter()
+            .map(|Measure { name, about, shade, digits }| MeasureData { name, about, shade: *shade, digits: *digits })
+            .collect(),
+        columns: &matrix.columns,
+        rows: matrix
+            .rows
+            .iter()
+            .map(|row| MatrixRowData {
+                name: &row.name,
+                cells: row.cells.iter().map(|c| c.as_ref().map(cell)).collect(),
+            })
+            .collect(),
+    }
 }
 
 fn rgba(color: Color) -> [u8; 4] {

@@ -11,14 +11,16 @@ use crate::{Align, Report, SummaryItem, Table, Verdict};
 
 const PAGE: &str = include_str!("../assets/page.html");
 const STAGE_REPLAY: &str = include_str!("../assets/stage_replay.html");
+const MATRIX: &str = "<section class=\"matrix card\" id=\"matrix\" aria-label=\"Comparison\"></section>";
 const STYLE: &str = include_str!("../assets/style.css");
 /// In the order they use each other.
-const SCRIPTS: [&str; 6] = [
+const SCRIPTS: [&str; 7] = [
     include_str!("../assets/math.js"),
     include_str!("../assets/meshes.js"),
     include_str!("../assets/shaders.js"),
     include_str!("../assets/view.js"),
     include_str!("../assets/plots.js"),
+    include_str!("../assets/matrix.js"),
     include_str!("../assets/page.js"),
 ];
 
@@ -36,6 +38,7 @@ pub(crate) fn page(report: &Report) -> String {
         "script" => script.clone(),
         "summary" => summary(&report.summary),
         "stage" => stage(report),
+        "matrix" if report.matrix.is_some() => MATRIX.into(),
         "tables" => tables(&report.tables),
         "notes" => notes(&report.notes),
         "data" => json_in_script(&data::json(report)),

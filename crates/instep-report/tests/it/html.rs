@@ -13,6 +13,7 @@ fn report() -> Report {
         frames: vec![ArrowFrame { origin: [0.0; 3], vector: [0.0, 0.0, 500.0] }],
     };
     Report {
+        matrix: None,
         title: "Kick 7".into(),
         subtitle: "a subtitle".into(),
         summary: vec![SummaryItem::new("Ball speed", "4.2 m/s", Verdict::Good, "wanted 4.0")],

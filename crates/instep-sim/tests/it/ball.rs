@@ -13,7 +13,7 @@ fn a_block_meets_the_ball_with_the_stated_restitution_in_every_phase() {
     for speed in [5.0, 10.0, 15.0] {
         for phase in 0..100 {
             let impact = block_impact(&settings, 1.0, speed, f64::from(phase) / 100.0);
-            assert!((impact.restitution - 0.70).abs() <= 0.02, "{speed} m/s, phase {phase}: {impact:?}");
+            assert!((impact.restitution - 0.65).abs() <= 0.02, "{speed} m/s, phase {phase}: {impact:?}");
             assert!(impact.energy_ratio <= 1.0 + 1e-9, "{speed} m/s, phase {phase}: {impact:?}");
             // Momentum is kept: v_ball / v_block = (1 + e) M / (M + m).
             let closed_form = (1.0 + impact.restitution) / 1.43;
@@ -67,8 +67,9 @@ fn a_ball_dropped_from_two_metres_bounces_as_stated() {
             height = height.max(world.ball().position[2] - 0.11);
         }
     }
-    // Restitution 0.82 gives 2 m x 0.82^2 = 1.345 m; FIFA asks for 1.25 to 1.55 m.
-    assert!((height - 1.345).abs() < 0.05, "{height} m");
+    // Restitution 0.63 gives 2 m x 0.63^2 = 0.79 m, of which the air takes 0.05 and gravity during the contact as much. FIFA
+    // asks for 0.6 to 1.0 m on turf.
+    assert!((height - 0.70).abs() < 0.03, "{height} m");
 }
 
 #[test]
@@ -79,11 +80,28 @@ fn a_rolling_ball_slows_down_as_the_pitch_says() {
     while world.time() < 1.0 {
         world.advance(&command, None).unwrap();
     }
+    // The air takes 1/2 rho c A v^2 / m = 0.023 v^2: 0.06 m/s of it in this second.
     let slowed = speed - world.ball().velocity[0];
-    assert!((slowed - 0.4).abs() < 0.03, "{slowed} m/s lost in a second");
+    assert!((slowed - 0.46).abs() < 0.03, "{slowed} m/s lost in a second");
     while world.time() < 7.0 {
         world.advance(&command, None).unwrap();
     }
     let at_rest = world.ball().velocity[0];
     assert!(at_rest.abs() < 0.01, "{at_rest} m/s when it should have stopped after 5 s");
+}
+
+/// A ball thrown up: the air has a closed form for the way up (v falls from v0 to 0 in h = m/2k ln(1 + k v0^2 / m g)).
+#[test]
+fn the_air_slows_a_ball_as_its_drag_says() {
+    let (mut world, command) = ball_world();
+    let (ball, v0) = (WorldSettings::default().ball, 12.0);
+    throw(&mut world, [0.0, 0.0, 1.0], [0.0, 0.0, v0], [0.0; 3]);
+    let mut height = 0.0_f64;
+    while world.time() < 1.3 {
+        world.advance(&command, None).unwrap();
+        height = height.max(world.ball().position[2] - 1.0);
+    }
+    let k = 0.5 * 1.204 * ball.drag * std::f64::consts::PI * ball.radius * ball.radius;
+    let expected = ball.mass / (2.0 * k) * (k * v0 * v0 / (ball.mass * 9.81)).ln_1p();
+    assert!((height - expected).abs() < 0.01, "{height} m in place of {expected} m; {} m without air", v0 * v0 / 19.62);
 }

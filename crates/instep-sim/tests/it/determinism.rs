@@ -41,8 +41,8 @@ fn trial(seed: u64) -> Trial {
         ball: BallState::at_rest([0.30, -0.085, 0.11]),
         direction: 0.0,
     };
-    let mut swing = Swing { stand: robot.stand[7..].to_vec(), hip: leg.hip_pitch, knee: leg.knee };
-    run(&robot, &settings, &mut swing).unwrap()
+    let swing = || Swing { stand: robot.stand[7..].to_vec(), hip: leg.hip_pitch, knee: leg.knee };
+    run(&robot, &settings, &mut swing(), &mut swing()).unwrap()
 }
 
 #[test]

@@ -17,6 +17,15 @@ impl Controller for Greedy {
     }
 }
 
+/// Holds one pose.
+struct Hold(Vec<f64>);
+
+impl Controller for Hold {
+    fn tick(&mut self, _: &Sensors, command: &mut JointCommand) {
+        command.positions.copy_from_slice(&self.0);
+    }
+}
+
 #[test]
 fn a_greedy_controller_gets_no_more_than_the_motors_have() {
     let robot = robot("prestoe");
@@ -34,7 +43,7 @@ fn a_greedy_controller_gets_no_more_than_the_motors_have() {
         ball: BallState::at_rest([5.0, 0.0, 0.11]),
         direction: 0.0,
     };
-    let trial = run(&robot, &settings, &mut Greedy).unwrap();
+    let trial = run(&robot, &settings, &mut Greedy, &mut Greedy).unwrap();
     for group in &trial.groups {
         assert!(group.torque <= group.torque_limit * (1.0 + 1e-12), "{group:?}");
     }
@@ -109,4 +118,59 @@ fn feed_forward_reaches_a_torque_drive_late_and_a_position_servo_never() {
     assert!((ideal - 0.002).abs() < 1e-9 && (0.004..=0.012).contains(&late), "{ideal} {late}");
     assert_eq!(nudged("nao", Fidelity::AsBuilt), None);
     assert_eq!(nudged("wolfgang", Fidelity::AsBuilt), None);
+}
+
+/// Something outside drives a joint past its speed limit: the trial says which, how far and when.
+#[test]
+fn a_joint_beyond_its_speed_limit_is_reported() {
+    let robot = robot("prestoe");
+    let mut q = robot.stand.clone();
+    q[2] += 2.0;
+    let joint = robot.joints.iter().position(|joint| joint.name == "left_elbow").unwrap();
+    let run_at = |share: f64| {
+        let mut v = vec![0.0; robot.nv()];
+        v[6 + joint] = -share * robot.joints[joint].speed;
+        let settings = TrialSettings {
+            world: WorldSettings::default(),
+            seed: 1,
+            duration: 0.02,
+            control_period: 0.002,
+            q: q.clone(),
+            v,
+            ball: BallState::at_rest([5.0, 0.0, 0.11]),
+            direction: 0.0,
+        };
+        let hold = || Hold(q[7..].to_vec());
+        run(&robot, &settings, &mut hold(), &mut hold()).unwrap().limit_violations
+    };
+    let beyond = run_at(1.1);
+    let [violation] = &beyond[..] else { panic!("{beyond:?}") };
+    assert_eq!((violation.joint.as_str(), violation.quantity), ("left_elbow", "speed"));
+    assert_eq!(violation.limit, robot.joints[joint].speed);
+    assert!((violation.peak / violation.limit - 1.1).abs() < 1e-9 && violation.time < 0.004, "{violation:?}");
+    assert_eq!(run_at(0.98), []);
+}
+
+/// The robot in the world may weigh more than its model says; its soles then carry more.
+#[test]
+fn an_error_of_the_masses_is_in_the_world() {
+    let robot = robot("prestoe");
+    let carried = |mass: f64| {
+        let mut settings = WorldSettings::default();
+        settings.model_error.mass = mass;
+        let mut world = World::new(robot.clone(), &settings).unwrap();
+        let mut command = JointCommand::zeros(robot.joints.len());
+        command.positions.copy_from_slice(&robot.stand[7..]);
+        let mut forces = vec![nalgebra::Vector3::zeros(); robot.contacts.len()];
+        let mut mean = 0.0;
+        for step in 0..400 {
+            world.advance(&command, None).unwrap();
+            if step >= 200 {
+                world.contact_forces_into(&mut forces);
+                mean += forces.iter().map(|f| f.z).sum::<f64>() / 200.0;
+            }
+        }
+        mean / (9.81 * robot.mass())
+    };
+    assert!((carried(1.1) / carried(1.0) - 1.1).abs() < 0.02, "{} {}", carried(1.0), carried(1.1));
 }

@@ -89,3 +89,39 @@ fn noise_has_the_stated_deviation_and_follows_its_seed() {
     assert_eq!(drawn, draw(7));
     assert_ne!(drawn, draw(8));
 }
+
+/// Root mean square of `error` over 3000 readings of a standing robot.
+fn scatter(noise: SensorNoise, error: impl Fn(&World, &Sensors) -> f64) -> f64 {
+    let (world, _, mut suite) = standing(noise, 5);
+    let mut sensors = Sensors::default();
+    let mut squares = 0.0;
+    for _ in 0..3000 {
+        suite.sense(&world);
+        suite.read_into(0.0, &mut sensors);
+        squares += error(&world, &sensors).powi(2) / 3000.0;
+    }
+    squares.sqrt()
+}
+
+#[test]
+fn sights_of_the_ball_scatter_as_stated_on_both_axes() {
+    for axis in [0, 1] {
+        let true_place = [1.0, 0.0][axis];
+        let off =
+            |world: &World, sensors: &Sensors| sensors.ball.unwrap().position[axis] - true_place + world.q()[axis];
+        let measured = scatter(SensorNoise { ball: 0.02, ..SensorNoise::default() }, off);
+        assert!((measured / 0.02 - 1.0).abs() < 0.1, "axis {axis}: {measured} m");
+        assert!(scatter(SensorNoise::default(), off) < 1e-3);
+    }
+}
+
+#[test]
+fn the_orientation_estimate_scatters_as_stated_about_each_axis() {
+    for axis in [1, 2, 3] {
+        // Twice the vector part of a small rotation's quaternion is its angle about that axis.
+        let off = |world: &World, sensors: &Sensors| 2.0 * (sensors.orientation[axis] - world.q()[3 + axis]);
+        let measured = scatter(SensorNoise { orientation: 0.02, ..SensorNoise::default() }, off);
+        assert!((measured / 0.02 - 1.0).abs() < 0.1, "axis {axis}: {measured} rad");
+        assert!(scatter(SensorNoise::default(), off) < 1e-12);
+    }
+}

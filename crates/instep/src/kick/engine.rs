@@ -9,10 +9,12 @@ use instep_bench::scenario::Case;
 use instep_kick::KickRequest;
 use instep_motion::text;
 use instep_sim::World;
-use instep_sim::settings::{ModelError, WorldSettings};
+use instep_sim::audit::{Audit, Rerun};
+use instep_sim::settings::{Change, ModelError, WorldSettings};
+use instep_sim::start::StartErrors;
 use serde::Serialize;
 
-use super::{Source, Tried, summary};
+use super::{Source, Tried, steps, summary};
 use crate::failure::Failure;
 use crate::files;
 use crate::output::Output;
@@ -25,6 +27,13 @@ struct Answer {
     refused: Option<Refused>,
     /// What came of an accepted request.
     kicked: Option<Kicked>,
+    /// How the audit found it, and why; its keys are those of `instep kick` without an engine.
+    audit: Option<&'static str>,
+    audit_reason: Option<String>,
+    converged: Option<bool>,
+    rerun: Option<Rerun>,
+    touches: usize,
+    world_changes: Vec<Change>,
     direction_error_deg: Option<f64>,
     plan_s: f64,
     /// Report and recording, where there was one request and it was not refused.
@@ -38,7 +47,16 @@ struct Refused {
     message: String,
 }
 
-/// Runs `requests` one after the other, each from where the engine starts; a single one is shown in a report under `out`.
+/// Where files go.
+pub(super) struct Folders<'a> {
+    /// Report and recording.
+    pub(super) out: &'a Path,
+    /// Physics steps.
+    pub(super) steps: Option<&'a Path>,
+}
+
+/// Runs `requests` one after the other, each from where the engine starts; a single one is shown in a report under `out`, and its
+/// physics steps are kept where that is asked for.
 ///
 /// # Errors
 /// When engine or world cannot be made, or a simulation diverges. A refusal is an answer.
@@ -46,24 +64,26 @@ pub(super) fn run(
     subject: &Subject,
     engine: &str,
     requests: &[KickRequest],
-    world: Option<WorldSettings>,
+    settings: WorldSettings,
     seed: u64,
-    out: &Path,
+    folders: Folders,
     output: &Output,
 ) -> Result<ExitCode, Failure> {
+    let Folders { out, steps: kept } = folders;
     let (report, recording) = (out.join("report.html"), out.join("kick.mcap"));
     if requests.len() == 1 {
         for file in [&report, &recording] {
             files::check_file(file)?;
         }
     }
-    let mut settings = world.unwrap_or_else(|| subject.world());
-    settings.ball = subject.world().ball;
+    let world_changes = settings.changes(&subject.world());
     let mut world = World::new(subject.robot.clone(), &settings)?;
+    if let Some(folder) = kept {
+        steps::prepare(folder, &mut world)?;
+    }
     let mut answers = Vec::with_capacity(requests.len());
     let mut shown = None;
     for request in requests {
-        let mut planner = subject.engine(engine)?;
         let case = Case {
             request: *request,
             ball: request.ball.map(|v| if v.is_finite() { v } else { 1.0 }),
@@ -74,24 +94,45 @@ pub(super) fn run(
             ball_moved: None,
             turn: request.direction,
             side: 1.0,
+            start: StartErrors { joint: 0.0, joint_speed: 0.0, base_speed: 0.0 },
             seed,
         };
-        let (outcome, plan_s, ran) = run_case(subject, &case, planner.as_mut(), &mut world, &mut Vec::new())?;
+        let (outcome, plan_s, ran) = run_case(subject, engine, &case, &mut world, &mut Vec::new())?;
         let refused = outcome.as_ref().err().map(|r| Refused { cause: r.name(), message: r.explain(&subject.robot) });
         let kicked = outcome.ok();
         let direction_error_deg = kicked.and_then(|k| k.direction_error).map(f64::to_degrees);
+        if let (Some(folder), Some(ran)) = (kept, &ran) {
+            steps::write(folder, &mut world, &ran.trial)?;
+        }
+        let audit = ran.as_ref().map(|ran| ran.trial.audit.clone());
+        let touches = ran.as_ref().map_or(0, |ran| ran.trial.touches.len());
         let ran = ran.filter(|_| requests.len() == 1);
         let files = ran.as_ref().map(|_| (report.clone(), recording.clone())).unzip();
         let (report, recording) = files.clone();
-        answers.push(Answer { request: *request, refused, kicked, direction_error_deg, plan_s, report, recording });
-        if let (Some(Ran { plan, settings, trial }), (Some(report), Some(recording))) = (ran, files) {
+        answers.push(Answer {
+            request: *request,
+            refused,
+            kicked,
+            audit: audit.as_ref().map(Audit::verdict),
+            audit_reason: audit.as_ref().map(Audit::reason),
+            converged: audit.as_ref().map(|audit| audit.converged),
+            rerun: audit.as_ref().and_then(|audit| audit.rerun),
+            touches,
+            world_changes: world_changes.clone(),
+            direction_error_deg,
+            plan_s,
+            report,
+            recording,
+        });
+        if let (Some(Ran { plan, settings, trial, .. }), (Some(report), Some(recording))) = (ran, files) {
             let source = Source::Asked { engine: engine.to_owned(), request: *request, plan };
-            let tried = Tried { robot: subject.robot.clone(), source, settings, trial, report, recording };
+            let (robot, world_changes) = (subject.robot.clone(), world_changes.clone());
+            let tried = Tried { robot, source, settings, world_changes, trial, report, recording };
             tried.write()?;
             shown = Some(tried);
         }
     }
-    output.show(&serde_json::json!({ "requests": answers }), |paint| {
+    output.show(&serde_json::json!({ "requests": answers, "world_changes": world_changes }), |paint| {
         shown.as_ref().map_or_else(|| answers.iter().map(line).collect(), |tried| summary::text(tried, paint))
     })?;
     Ok(ExitCode::SUCCESS)
@@ -105,7 +146,7 @@ fn line(answer: &Answer) -> String {
         return format!("{place}refused: {message}\n");
     };
     let speed = kicked.ball_speed.map_or_else(
-        || if kicked.hit { "hit, speed not to be believed".into() } else { "missed".to_owned() },
+        || if kicked.audit_invalid { "touched, but not to be believed".into() } else { "missed".to_owned() },
         |v| format!("{v:.2} m/s"),
     );
     let error = answer.direction_error_deg.map_or_else(String::new, |e| format!(", {e:+.1} deg off"));

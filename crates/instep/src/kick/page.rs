@@ -18,11 +18,11 @@ const FRAME: f64 = 0.006;
 const CLOSE: f64 = 0.03;
 
 /// The whole page.
-pub(super) fn page(tried: &Tried) -> Report {
+pub(crate) fn page(tried: &Tried) -> Report {
     let (trial, name) = (&tried.trial, figure::capital(&tried.robot.name));
     let title = match &trial.impact {
-        Some(impact) if trial.audit.faults.is_empty() => format!("{name} kicks at {:.2} m/s", impact.ball_speed()),
-        Some(_) => format!("{name} kicks, but the impact is not to be believed"),
+        Some(_) if trial.audit.is_valid() => format!("{name} kicks at {:.2} m/s", trial.ball_speed.unwrap_or(0.0)),
+        Some(_) => format!("{name} kicks, but it is not to be believed"),
         None => format!("{name} misses the ball"),
     };
     let ball = tried.settings.ball.position;
@@ -41,6 +41,7 @@ pub(super) fn page(tried: &Tried) -> Report {
         replay: Some(replay(tried)),
         plots: plots(tried),
         notes: notes(tried),
+        ..Report::default()
     }
 }
 
@@ -55,7 +56,7 @@ fn items(tried: &Tried) -> Vec<SummaryItem> {
     match &trial.impact {
         None => items.push(SummaryItem::new("Ball", "not touched", Verdict::Bad, "no impact, no ball speed")),
         Some(impact) => {
-            let speed = format!("{:.2} m/s", impact.ball_speed());
+            let speed = format!("{:.2} m/s", trial.ball_speed.unwrap_or(0.0));
             let note = trial.launch_angle.map(|a| format!("{:.1}\u{b0} above the ground", a.to_degrees()));
             items.push(SummaryItem::new(
                 "Ball speed",
@@ -73,8 +74,12 @@ fn items(tried: &Tried) -> Vec<SummaryItem> {
             items.push(SummaryItem::new("Effective mass", mass, Verdict::Neutral, note));
         }
     }
-    let reason = if valid { "energy, restitution, time step".to_owned() } else { trial.audit.reason() };
-    items.push(SummaryItem::new("Impact audit", trial.audit.verdict(), verdict(valid), reason));
+    let reason = if valid {
+        "every touch, and the whole kick at a quarter of the step".to_owned()
+    } else {
+        trial.audit.reason()
+    };
+    items.push(SummaryItem::new("Audit", trial.audit.verdict(), verdict(valid), reason));
     let (state, note) = match trial.fell_at {
         None => ("upright".to_owned(), format!("to the end, {:.2} s", tried.settings.duration)),
         Some(_) => ("fell".to_owned(), summary::balance(tried)),
@@ -83,6 +88,10 @@ fn items(tried: &Tried) -> Vec<SummaryItem> {
     let beyond = trial.limit_violations.len();
     let limits = if beyond == 0 { "kept".to_owned() } else { format!("{beyond} broken") };
     items.push(SummaryItem::new("Joint limits", limits, verdict(beyond == 0), "torque and speed of every motor"));
+    if !tried.world_changes.is_empty() {
+        let changes: Vec<String> = tried.world_changes.iter().map(ToString::to_string).collect();
+        items.push(SummaryItem::new("World", "changed", Verdict::Bad, changes.join("; ")));
+    }
     items
 }
 
@@ -133,10 +142,19 @@ fn tables(tried: &Tried) -> Vec<Table> {
             title: "Impact".into(),
             columns: vec![Column::text("Measure"), Column::number("Value"), Column::text("How")],
             rows: vec![
-                row("Ball speed, re-run", optional(trial.audit.rerun_ball_speed, "m/s"), "at a tenth of the time step"),
-                row("Energy gained", optional(trial.audit.energy_gain, "J"), "beyond the work of motors and gravity"),
+                row(
+                    "Re-run",
+                    trial.audit.rerun.as_ref().map_or_else(|| "none".into(), summary::rerun),
+                    "the whole kick at a quarter of the step",
+                ),
+                row(
+                    "Energy gained",
+                    optional(trial.audit.energy_gain, "J"),
+                    "beyond the work of motors, pushes and gravity",
+                ),
+                row("Penetration", format!("{:.1} mm", impact.depth * 1e3), "the deepest of the hardest touch"),
                 row("Motors' work", format!("{:.2} J", impact.motor_work), "during contact"),
-                row("Touches", impact.touches.to_string(), "contacts with pauses between, whole trial"),
+                row("Touches", trial.touches.len().to_string(), "contacts with pauses between, whole trial"),
                 row(
                     "Support slip",
                     optional(trial.support_slip.map(|s| s * 1e3), "mm"),
@@ -350,13 +368,16 @@ fn notes(tried: &Tried) -> Vec<String> {
         from,
         how.into(),
         format!(
-            "Time step {} ms, {} ms while the ball is near a foot. Ball speed is that at the last contact of the \
-             first impact. The audit: kinetic energy may not grow by more than motors and gravity gave, effective \
-             restitution is at most {}, and a re-run at a tenth of the step may change the ball's speed by {} % at most.",
+            "Time step {} ms, {} ms while the ball is near the robot. Ball speed and direction are those after the last touch. The \
+             audit: at every touch kinetic energy may not grow by more than motors, pushes and gravity gave, effective restitution \
+             is at most {}, ball and robot are at most half a ball's radius and {} ms in one another; and the whole kick, run again \
+             at a quarter of the step, may change the ball's speed by {} % and its direction by {}\u{b0} at most.",
             step.far * 1e3,
             step.near * 1e3,
             instep_sim::audit::MAX_RESTITUTION,
-            instep_sim::audit::MAX_STEP_ERROR * 100.0,
+            instep_sim::audit::MAX_CONTACT * 1e3,
+            instep_sim::audit::SPEED_CHANGE[1] * 100.0,
+            instep_sim::audit::DIRECTION_CHANGE_DEG[1],
         ),
         "A fall is a base tilted by more than 60\u{b0} or at less than half its standing height, or any part but a \
          foot on the ground."

@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use instep_sim::audit::Rerun;
 use instep_sim::trial::{GroupPeak, Trial};
 use nalgebra::Vector3;
 
@@ -55,6 +56,17 @@ pub(super) fn balance(tried: &Tried) -> String {
     }
 }
 
+/// What the whole kick led to at a finer step.
+pub(super) fn rerun(rerun: &Rerun) -> String {
+    let change = |value: Option<f64>, factor: f64, unit: &str| {
+        value.map_or_else(|| "missed the ball".into(), |v| format!("{:+.2}{unit}", v * factor))
+    };
+    let speed = change(rerun.ball_speed_change, 100.0, " % ball speed");
+    let stands = if rerun.upright { "upright" } else { "fell" };
+    let direction = rerun.direction_change_deg.map_or_else(String::new, |v| format!(", {v:+.2}\u{b0} direction"));
+    format!("{speed}{direction}, {stands}, at steps of {} ms", rerun.step * 1e3)
+}
+
 /// Signed angle and the side it leads to.
 pub(super) fn direction(angle: f64) -> String {
     let degrees = angle.to_degrees();
@@ -86,7 +98,7 @@ fn write_all(out: &mut String, tried: &Tried, paint: Paint) -> std::fmt::Result 
     match &trial.impact {
         None => writeln!(out, "{}", paint.bad("  The robot did not touch the ball: there is no ball speed."))?,
         Some(impact) => {
-            let speed = format!("{:.2} m/s", impact.ball_speed());
+            let speed = format!("{:.2} m/s", trial.ball_speed.unwrap_or(0.0));
             let speed = if trial.audit.faults.is_empty() {
                 paint.strong(&speed)
             } else {
@@ -102,8 +114,11 @@ fn write_all(out: &mut String, tried: &Tried, paint: Paint) -> std::fmt::Result 
             out.push_str(&row("foot speed", format!("{strike}; {}", impact.link)));
             out.push_str(&row("effective mass", format!("{:.2} kg", impact.effective_mass)));
             out.push_str(&row("restitution", format!("{:.3}", impact.restitution)));
-            let touches =
-                if impact.touches > 1 { format!("; touched {} times", impact.touches) } else { String::new() };
+            let touches = if trial.touches.len() > 1 {
+                format!("; touched {} times", trial.touches.len())
+            } else {
+                String::new()
+            };
             let contact = format!("{:.3} s, for {:.1} ms{touches}", impact.time, impact.duration * 1e3);
             out.push_str(&row("impact at", contact));
         }
@@ -113,6 +128,13 @@ fn write_all(out: &mut String, tried: &Tried, paint: Paint) -> std::fmt::Result 
         verdict => paint.bad(&format!("{verdict}: {}", trial.audit.reason())),
     };
     out.push_str(&row("audit", audit));
+    if let Some(rerun) = &trial.audit.rerun {
+        let text = self::rerun(rerun);
+        out.push_str(&row("re-run", if trial.audit.converged { text } else { paint.bad(&text) }));
+    }
+    for change in &tried.world_changes {
+        out.push_str(&row("changed world", paint.bad(&change.to_string())));
+    }
     let balance = balance(tried);
     out.push_str(&row("balance", if trial.upright() { paint.good(&balance) } else { paint.bad(&balance) }));
     if let Some(slip) = trial.support_slip {

@@ -63,6 +63,7 @@ pub(super) fn page(table: &Table, stream: &Stream, groups: &[(&'static str, Vec<
         .map(|(k, (head, _))| if k == 0 { Column::text(head) } else { Column::number(head) });
     let rows = table.methods.iter().map(|row| cells(row).into_iter().map(|(_, text)| Cell::from(text)).collect());
     Report {
+        matrix: None,
         title: format!("Where am I: {}", table.scenario),
         subtitle: format!(
             "field {} \u{b7} {} seeds from {} \u{b7} the replay shows the first",

@@ -111,6 +111,7 @@ pub(super) fn page(done: &Done, k: &Kinodynamic) -> Report {
     notes.extend(summary::advice(k));
     notes.push(format!("Motion data: {}", k.reference.source.acknowledgement));
     Report {
+        matrix: None,
         title: match k.status.feasible() {
             true => format!("{clip} as {} can do it", figure::capital(&done.robot.name)),
             false => format!("{clip}: not what {} can do", figure::capital(&done.robot.name)),

@@ -33,6 +33,7 @@ fn kinematic(done: &Done) -> Report {
     let mut data = done.robot.data();
     let times: Vec<f64> = (0..r.positions.len()).map(|frame| done.clip.time(frame)).collect();
     Report {
+        matrix: None,
         title: format!("{clip} on {}", done.robot.name),
         subtitle: format!("{} \u{b7} {}", done.stage(), done.robot.title),
         summary: items(done),

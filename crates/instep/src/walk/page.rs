@@ -25,6 +25,7 @@ pub(super) fn page(made: &Made) -> Report {
         (None, Asked::Velocity(_)) => format!("{name} walks at {:.2} m/s", walked.mean.x.hypot(walked.mean.y)),
     };
     Report {
+        matrix: None,
         title,
         subtitle: format!("{} \u{b7} {:.0} s on its senses \u{b7} seed {}", made.robot.title, made.task.duration, made.task.seed),
         summary: items(made),
