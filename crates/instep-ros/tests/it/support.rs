@@ -28,7 +28,10 @@ pub(crate) fn robot() -> Arc<Robot> {
 pub(crate) fn simulation(robot: &Arc<Robot>, paced: bool) -> Simulation {
     let dynamic = DynamicKick::load(Arc::clone(robot)).unwrap();
     let ball = *dynamic.ball();
-    let mut world = WorldSettings { ball: Ball { mass: ball.mass, radius: ball.radius }, ..WorldSettings::default() };
+    let mut world = WorldSettings {
+        ball: Ball { mass: ball.mass, radius: ball.radius, ..Ball::default() },
+        ..WorldSettings::default()
+    };
     world.step.near = 0.0005;
     Simulation { world, ball: [0.2, -0.05], seed: 1, paced }
 }
