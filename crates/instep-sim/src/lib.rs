@@ -18,6 +18,7 @@ pub mod impact;
 mod model;
 pub mod sensors;
 pub mod settings;
+mod sights;
 pub mod trial;
 mod world;
 
