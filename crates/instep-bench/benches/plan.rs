@@ -29,7 +29,7 @@ fn main() {
                 let mut world = World::new(robot.clone(), &subject.world()).unwrap();
                 let far = BallState::at_rest([1.0, 0.0, subject.size.ball]);
                 world.reset(&robot.stand, &vec![0.0; robot.nv()], &far).unwrap();
-                let mut suite = SensorSuite::new(&world, 1);
+                let mut suite = SensorSuite::new(&mut world, 1);
                 suite.sense(&world);
                 let mut sensors = Sensors::default();
                 suite.read_into(0.0, &mut sensors);

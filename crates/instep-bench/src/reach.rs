@@ -118,7 +118,7 @@ impl Bed {
     fn follow(&mut self, line: &Line, reach: &mut Reach) -> Result<Option<usize>, BenchError> {
         let robot = Arc::clone(self.world.robot());
         self.world.reset(&line.start, &vec![0.0; robot.nv()], &BallState::at_rest(AWAY))?;
-        let mut suite = SensorSuite::new(&self.world, 0);
+        let mut suite = SensorSuite::new(&mut self.world, 0);
         suite.sense(&self.world);
         let duration = self.probe.start(line);
         let period = (self.probe.control_period() / self.world.settings().step.tick).round().max(1.0) as usize;

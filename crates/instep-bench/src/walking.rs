@@ -139,7 +139,7 @@ pub fn walk(
     world.reset(&robot.stand, &vec![0.0; robot.nv()], &far_ball)?;
     let limits = settings.limits.clone();
     let mut walker = Walker::new(Arc::clone(robot), settings)?;
-    let mut suite = SensorSuite::new(&world, task.seed);
+    let mut suite = SensorSuite::new(&mut world, task.seed);
     suite.sense(&world);
     let mut sensors = Sensors::default();
     let mut command = JointCommand::zeros(robot.joints.len());

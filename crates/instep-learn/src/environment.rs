@@ -203,12 +203,12 @@ impl Environment {
     /// # Errors
     /// When the world cannot be made.
     pub fn new(scene: Arc<Scene>, seed: u64, index: usize) -> Result<Self, LearnError> {
-        let world = scene.world()?;
+        let mut world = scene.world()?;
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(index as u64 + 1);
         let follower = scene.follower.clone();
         Ok(Self {
-            suite: SensorSuite::new(&world, 0),
+            suite: SensorSuite::new(&mut world, 0),
             world,
             sensors: Sensors::default(),
             command: JointCommand::zeros(scene.robot.joints.len()),
@@ -263,7 +263,7 @@ impl Environment {
         let ball = if self.with_ball { track.reference().ball } else { NO_BALL };
         self.world.reset(&q, &v, &BallState::at_rest(ball))?;
         let seed = self.rng.random();
-        self.suite = SensorSuite::new(&self.world, seed);
+        self.suite = SensorSuite::new(&mut self.world, seed);
         self.suite.sense(&self.world);
         (self.tick, self.started, self.moving) = (tick, tick, None);
         self.last_action.fill(0.0);

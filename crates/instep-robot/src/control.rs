@@ -27,6 +27,18 @@ pub struct Sensors {
     pub ball: Option<BallObservation>,
 }
 
+impl Sensors {
+    /// Takes over all of `other`'s readings; allocates nothing once the vectors have their size.
+    pub fn copy_from(&mut self, other: &Self) {
+        self.joint_positions.clone_from(&other.joint_positions);
+        self.joint_velocities.clone_from(&other.joint_velocities);
+        self.contact_forces.clone_from(&other.contact_forces);
+        let Self { time, gyro, accelerometer, orientation, centre_of_pressure, ball, .. } = other;
+        (self.time, self.gyro, self.accelerometer) = (*time, *gyro, *accelerometer);
+        (self.orientation, self.centre_of_pressure, self.ball) = (*orientation, *centre_of_pressure, *ball);
+    }
+}
+
 /// A sight of the ball.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BallObservation {

@@ -24,6 +24,7 @@ mod meshes;
 mod model_file;
 mod names;
 mod robot;
+pub mod senses;
 pub mod settings;
 mod warnings;
 

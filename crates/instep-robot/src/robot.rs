@@ -10,12 +10,13 @@ use std::sync::Arc;
 use instep_motion::phase::Side;
 use mujoco_rs::prelude::*;
 use mujoco_rs::wrappers::mj_editing::MjSpec;
-use nalgebra::Vector3;
+use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::RobotError;
 use crate::drive::{DriveSettings, Pid};
 use crate::model_file::{sane, spec};
 use crate::names::{Names, drives, joint_index, joints, self_collision};
+use crate::senses::{Camera, SenseSettings};
 use crate::settings::{LegFile, PointFile, RobotFile};
 
 /// One actuated joint. Its position in [`Robot::joints`] is its index in every joint vector.
@@ -127,6 +128,10 @@ pub struct Robot {
     pub groups: Vec<String>,
     /// What its drives take, how often and how late.
     pub drives: DriveSettings,
+    /// How its senses err.
+    pub senses: SenseSettings,
+    /// The camera that looks for the ball, where it has one.
+    pub camera: Option<Camera>,
     /// MuJoCo body index of the base link.
     pub base: usize,
     /// The inertial sensor, with the base link's axes.
@@ -236,7 +241,15 @@ impl Robot {
             stand[7 + joint] = angle;
         }
 
+        if let Some((field, found, expected)) = settings.senses.fault() {
+            return Err(names.wrong(&field, found, expected.into()));
+        }
+        let camera_link =
+            settings.senses.camera.as_ref().map(|c| names.link("senses.camera.link", &c.link)).transpose()?;
+
         let mut robot = Self {
+            senses: settings.senses.clone(),
+            camera: None,
             name: settings.name.clone(),
             title: settings.title.clone(),
             joints,
@@ -254,6 +267,21 @@ impl Robot {
             file: settings,
         };
         let mut data = robot.data();
+        if let (Some(link), Some(camera)) = (camera_link, &robot.senses.camera) {
+            let mut straight = vec![0.0; robot.nq()];
+            straight[3] = 1.0;
+            data.set_position(&straight);
+            robot.camera = Some(Camera {
+                at: LinkPoint { link, point: camera.position.into() },
+                link_from_camera: data.link_rotation(link).inverse()
+                    * UnitQuaternion::from_axis_angle(&Vector3::y_axis(), camera.pitch),
+                field_of_view: camera.field_of_view,
+                period: camera.period,
+                latency: camera.latency,
+                angle_error: camera.angle_error,
+                correlation: camera.correlation,
+            });
+        }
         data.set_position(&robot.stand);
         robot.stand[2] -= robot.contacts.iter().map(|c| data.point(&c.at).z - c.radius).fold(f64::INFINITY, f64::min);
         Ok(robot)

@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use crate::drive::{DriveSettings, Pid};
+use crate::senses::SenseSettings;
 
 /// A whole `robot.toml`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -22,6 +23,9 @@ pub struct RobotFile {
     /// What its drives take, how often and how late; absent, torque drives at 1 kHz without delay.
     #[serde(default)]
     pub drives: DriveSettings,
+    /// How its senses err; absent, they are perfect.
+    #[serde(default)]
+    pub senses: SenseSettings,
     /// Joints that share limits and gains; every joint of the model is in exactly one.
     pub group: Vec<GroupFile>,
     /// Joint angles of the pose that it stands in, rad; joints not named are at zero.

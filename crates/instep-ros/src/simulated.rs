@@ -44,8 +44,8 @@ impl SimBody {
         period: f64,
         seed: u64,
     ) -> Result<Self, SimError> {
-        let world = World::new(Arc::clone(&robot), settings)?;
-        let suite = SensorSuite::new(&world, seed);
+        let mut world = World::new(Arc::clone(&robot), settings)?;
+        let suite = SensorSuite::new(&mut world, seed);
         let data = robot.data();
         // A rounding of a small positive number.
         let far_steps = (period / settings.step.tick).round().max(1.0) as usize;

@@ -23,6 +23,7 @@ mod model;
 pub mod rate;
 pub mod sensors;
 pub mod settings;
+mod sights;
 pub mod start;
 pub mod trial;
 mod world;

@@ -20,7 +20,9 @@ pub struct WorldSettings {
     pub step: Step,
     /// The robot's drives.
     pub drives: Fidelity,
-    /// Sensor noise and delay.
+    /// The robot's senses.
+    pub senses: Fidelity,
+    /// Sensor noise and delay beyond the senses' own.
     pub sensors: SensorNoise,
     /// How the robot in the world differs from the model that its controller knows.
     pub model_error: ModelError,
@@ -32,7 +34,8 @@ pub struct WorldSettings {
 pub enum Fidelity {
     /// As `robot.toml` has it.
     AsBuilt,
-    /// Perfect: drives take angle, speed and torque at every step, at once, without play and friction.
+    /// Perfect: drives take angle, speed and torque at every step, at once, without play and friction; senses tell the truth at
+    /// every tick.
     #[default]
     Ideal,
 }

@@ -11,8 +11,10 @@ use std::sync::Arc;
 use instep_robot::Robot;
 use instep_robot::control::{JointCommand, drive_torque, torque_range_over_step};
 use instep_robot::drive::{Drives, Measured};
+use instep_robot::senses::Camera;
+use mujoco_rs::mujoco_c;
 use mujoco_rs::prelude::*;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Isometry3, Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 use crate::SimError;
 use crate::impact::ImpactWatch;
@@ -78,6 +80,8 @@ pub struct World {
     is_body: Vec<bool>,
     /// `None`: ideal ones.
     drives: Option<Drives>,
+    /// Zeros of the encoders, which drives and sensors share, rad.
+    encoder_offsets: Vec<f64>,
     peaks: Vec<JointPeak>,
     time: f64,
     motor_work: f64,
@@ -170,6 +174,7 @@ impl World {
         let joints = robot.joints.len();
         let mut world = Self {
             drives: (settings.drives == Fidelity::AsBuilt).then(|| Drives::new(&robot)),
+            encoder_offsets: vec![0.0; joints],
             robot,
             settings: *settings,
             data: MjData::try_new(Box::new(model)).map_err(|e| refused(e.to_string()))?,
@@ -305,7 +310,8 @@ impl World {
             let inverse_inertia = self.data.q_ldiag_inv()[6 + i];
             let torque = match &mut self.drives {
                 Some(drives) => {
-                    let now = Measured { position: q, velocity: v, voltage: 1.0, step: dt, inverse_inertia };
+                    let position = q + self.encoder_offsets[i];
+                    let now = Measured { position, velocity: v, voltage: 1.0, step: dt, inverse_inertia };
                     drives.torque(i, joint, now)
                 }
                 None => {
@@ -528,6 +534,51 @@ impl World {
     /// Origin of a link (m) and `world_from_link`, as of the start of the last step.
     pub(crate) fn link_pose(&self, link: usize) -> (Vector3<f64>, Matrix3<f64>) {
         (self.data.xpos()[link].into(), Matrix3::from_row_slice(&self.data.xmat()[link]))
+    }
+
+    /// `world_from_camera` of the robot's `camera`, m, as of the start of the last step.
+    #[must_use]
+    pub fn camera_pose(&self, camera: &Camera) -> Isometry3<f64> {
+        let (origin, rotation) = self.link_pose(camera.at.link);
+        let turn = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation));
+        Isometry3::from_parts((origin + rotation * camera.at.point).into(), turn * camera.link_from_camera)
+    }
+
+    /// `world_from_heading`: the base link's ground projection and its heading.
+    #[must_use]
+    pub fn heading(&self) -> Isometry3<f64> {
+        let q = self.q();
+        let yaw = crate::sensors::orientation(q).euler_angles().2;
+        Isometry3::new(Vector3::new(q[0], q[1], 0.0), Vector3::z() * yaw)
+    }
+
+    /// Whether nothing but the link `but` stands between `from` and the ball at `to` (m).
+    pub(crate) fn sees(&self, from: Vector3<f64>, to: Vector3<f64>, but: usize) -> bool {
+        let way = to - from;
+        let distance = way.norm();
+        let (from, way) = ([from.x, from.y, from.z], [way.x / distance, way.y / distance, way.z / distance]);
+        let mut geom = -1;
+        // SAFETY: model and data belong together, the vectors have three numbers, no groups and no normal are asked for.
+        let hit = unsafe {
+            mujoco_c::mj_ray(
+                self.data.model().ffi(),
+                self.data.ffi(),
+                &raw const from,
+                &raw const way,
+                std::ptr::null(),
+                true,
+                i32::try_from(but).unwrap_or(-1),
+                &raw mut geom,
+                std::ptr::null_mut(),
+            )
+        };
+        usize::try_from(geom).is_ok_and(|geom| geom == self.ball_geom)
+            || !(0.0..distance - self.settings.ball.radius).contains(&hit)
+    }
+
+    /// Fits other encoders, whose zeros (rad) are off by `offsets`.
+    pub(crate) fn set_encoder_offsets(&mut self, offsets: &[f64]) {
+        self.encoder_offsets.copy_from_slice(offsets);
     }
 
     /// Every contact of the ball with the robot in the last step.

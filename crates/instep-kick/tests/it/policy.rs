@@ -34,7 +34,7 @@ fn odometry_follows_a_kick_through_its_impact_within_three_centimetres() {
     let settings = WorldSettings::default();
     let mut world = World::new(Arc::clone(&robot), &settings).unwrap();
     world.reset(&q, &v, &BallState::at_rest(reference.ball)).unwrap();
-    let mut suite = SensorSuite::new(&world, 1);
+    let mut suite = SensorSuite::new(&mut world, 1);
     suite.sense(&world);
     let mut sensors = Sensors::default();
     let mut command = JointCommand::zeros(robot.joints.len());
@@ -59,7 +59,7 @@ fn odometry_follows_a_kick_through_its_impact_within_three_centimetres() {
 fn standing_feet_take_a_wrong_start_out_of_the_odometry() {
     let (robot, _) = prestoe();
     let mut world = World::new(Arc::clone(&robot), &WorldSettings::default()).unwrap();
-    let mut suite = SensorSuite::new(&world, 1);
+    let mut suite = SensorSuite::new(&mut world, 1);
     let mut sensors = Sensors::default();
     let mut command = JointCommand::zeros(robot.joints.len());
     command.positions.copy_from_slice(&robot.stand[7..]);
@@ -104,7 +104,7 @@ fn on_the_reference_every_error_is_zero_and_the_command_is_the_reference() {
     track.sample_into(0.5, &mut state);
     let mut world = World::new(Arc::clone(&robot), &WorldSettings::default()).unwrap();
     world.reset(&state.q, &state.v, &BallState::at_rest(reference.ball)).unwrap();
-    let mut suite = SensorSuite::new(&world, 1);
+    let mut suite = SensorSuite::new(&mut world, 1);
     suite.sense(&world);
     let mut sensors = Sensors::default();
     suite.read_into(0.0, &mut sensors);

@@ -62,7 +62,7 @@ impl Rig {
         let foot = engine.footprint_from_base();
         let at = [ball[0] - foot[0], ball[1] - foot[1], model.radius];
         world.reset(&robot.stand, &vec![0.0; robot.nv()], &BallState::at_rest(at)).unwrap();
-        let mut suite = SensorSuite::new(&world, 1);
+        let mut suite = SensorSuite::new(&mut world, 1);
         suite.sense(&world);
         let mut sensors = Sensors::default();
         suite.read_into(0.0, &mut sensors);

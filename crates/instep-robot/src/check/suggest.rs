@@ -60,6 +60,7 @@ pub(crate) fn suggest(outline: &Outline, markup: &Markup, limbs: &Limbs, model: 
         model: model.file_name().map_or_else(|| UNKNOWN.into(), |file| file.to_string_lossy().into_owned()),
         base: BaseFile { link: known(outline.base.map_or("", |base| outline.link_name(base))), imu: [0.0; 3] },
         drives: crate::drive::DriveSettings::default(),
+        senses: crate::senses::SenseSettings::default(),
         group,
         stand,
         landmark: landmarks(outline, limbs, sides.as_ref(), &contact),

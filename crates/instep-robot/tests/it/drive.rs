@@ -146,3 +146,42 @@ proptest! {
         }
     }
 }
+
+/// A copy of a robot's folder with one change in its `robot.toml`.
+fn changed(name: &str, from: &str, to: &str) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    for entry in std::fs::read_dir(crate::support::robot_folder(name)).unwrap() {
+        let entry = entry.unwrap();
+        if entry.file_type().unwrap().is_file() {
+            std::fs::copy(entry.path(), folder.path().join(entry.file_name())).unwrap();
+        }
+    }
+    let file = folder.path().join("robot.toml");
+    let text = std::fs::read_to_string(&file).unwrap();
+    assert!(text.contains(from), "{from}");
+    std::fs::write(&file, text.replacen(from, to, 1)).unwrap();
+    instep_robot::Robot::load(folder.path()).unwrap_err().to_string()
+}
+
+#[test]
+fn drives_and_senses_that_cannot_be_are_refused_with_their_key() {
+    for (from, to, key, expected) in [
+        ("delay = 0.010", "delay = -0.001", "drives.delay", "0 to 0.2 s"),
+        ("period = 0.012", "period = 0", "drives.period", "0.0001 to 0.1 s"),
+        ("sag = 0.1", "sag = 1.0", "drives.sag", "[0, 0.9]"),
+        ("play = 0.0087", "play = 4.0", "group[0].play", "within the joint's range"),
+        ("dead_zone = 0.0015", "dead_zone = -1", "group[0].dead_zone", "within the joint's range"),
+        ("static_friction = 0.084", "static_friction = 9", "group[0].static_friction", "at most the torque"),
+        ("pid = { p = 10.55 }", "pid = { p = 0.0 }", "group[0].pid.p", "above 0"),
+        ("delay = 0.012", "delay = -0.012", "senses.delay", "0 to 0.2 s"),
+        ("gyro_bias = 0.01", "gyro_bias = -1.0", "senses.gyro_bias", "at least 0"),
+        ("link = \"Head\"", "link = \"Haed\"", "senses.camera.link", "nearest is \"Head\""),
+        ("field_of_view = [0.983, 0.763]", "field_of_view = [0.0, 0.7]", "senses.camera.field_of_view", "above 0"),
+        ("pitch = 0.693", "pitch = 0.693\nlatency = [0.06, 0.03]", "senses.camera.latency", "the lesser first"),
+        ("pitch = 0.693", "pitch = 0.693\nperiod = 0.0", "senses.camera.period", "0.001 to 1 s"),
+        ("kind = \"position_servo\"", "kind = \"magic\"", "line", "position_servo"),
+    ] {
+        let message = changed("nao", from, to);
+        assert!(message.contains("robot.toml") && message.contains(key) && message.contains(expected), "{message}");
+    }
+}

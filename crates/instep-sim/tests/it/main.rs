@@ -13,6 +13,7 @@ mod rig;
 mod ball;
 mod determinism;
 mod limits;
+mod senses;
 mod sensors;
 mod trial;
 

@@ -10,10 +10,10 @@ use crate::robot;
 /// A standing world, its command and its sensors.
 fn standing(noise: SensorNoise, seed: u64) -> (World, JointCommand, SensorSuite) {
     let settings = WorldSettings { sensors: noise, ..WorldSettings::default() };
-    let world = World::new(robot("prestoe"), &settings).unwrap();
+    let mut world = World::new(robot("prestoe"), &settings).unwrap();
     let mut command = JointCommand::zeros(world.robot().joints.len());
     command.positions.copy_from_slice(&world.robot().stand[7..]);
-    let suite = SensorSuite::new(&world, seed);
+    let suite = SensorSuite::new(&mut world, seed);
     (world, command, suite)
 }
 
