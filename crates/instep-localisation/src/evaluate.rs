@@ -62,7 +62,7 @@ pub struct Track {
     pub samples: Vec<Sample>,
     /// Replacements of the pose.
     pub resets: usize,
-    /// Replacements of a pose that was right.
+    /// Replacements that made the pose worse (a radian counts as 2 m).
     pub false_resets: usize,
     /// What each frame cost, s.
     pub update_times: Vec<f64>,
@@ -100,10 +100,10 @@ pub fn follow(method: Box<dyn Method>, stream: &Stream, clock: &dyn Fn() -> f64)
                 }
                 if localiser.method().resets() > resets {
                     track.resets += 1;
-                    let healthy = open.is_some_and(|t| {
-                        t.pose.distance(&before) < RIGHT[0] && wrap(t.pose.heading - before.heading).abs() < RIGHT[1]
-                    });
-                    track.false_resets += usize::from(healthy);
+                    let off = |p: &Pose, t: &Pose| p.distance(t).hypot(2.0 * wrap(p.heading - t.heading));
+                    let after = localiser.pose();
+                    let worse = open.is_some_and(|t| off(&after, &t.pose) > off(&before, &t.pose));
+                    track.false_resets += usize::from(worse);
                 }
             }
             Told::Field(_) | Told::Start(_) => {}
@@ -169,7 +169,7 @@ pub struct Measures {
     pub wrong_half_rate: f64,
     /// Share of the time in which the estimate was farther than 1 m off, or missing.
     pub astray_rate: f64,
-    /// Replacements of a pose that was right, over all runs.
+    /// Replacements that made the pose worse, over all runs.
     pub false_resets: usize,
     /// Replacements, over all runs.
     pub resets: usize,

@@ -79,7 +79,7 @@ pub(super) fn page(table: &Table, stream: &Stream, groups: &[(&'static str, Vec<
              last check found."
                 .into(),
             "Errors are distances on the ground at equal time; the standard deviation is that of the distances, so that \
-             MSE = MAE\u{b2} + STD\u{b2}. A reset is false when the pose that it replaces was right to 0.5 m and 15\u{b0}. \
+             MSE = MAE\u{b2} + STD\u{b2}. A reset is false when it makes the pose worse. \
              Times are those of one core."
                 .into(),
         ],
