@@ -120,6 +120,15 @@ pub enum Replaced {
     InKeepOut,
 }
 
+impl std::fmt::Display for Replaced {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::OffField => "the goal lies off the field; the nearest place on it is walked to",
+            Self::InKeepOut => "the goal lies inside a keep-out; the nearest free place is walked to",
+        })
+    }
+}
+
 /// What to ask of walking.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Command {

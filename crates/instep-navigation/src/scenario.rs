@@ -88,6 +88,7 @@ pub const SCENARIOS: &[Scenario] = &[
     Scenario { name: "two-chasers", title: "two opponents walk at the robot at 0.4 m/s", runs: 100 },
     Scenario { name: "sideways", title: "1.5 m to the side, heading held", runs: 10 },
     Scenario { name: "round-ball", title: "half round a ball, facing it", runs: 10 },
+    Scenario { name: "behind-ball", title: "behind a ball 4 m away, two opponents on the way", runs: 100 },
     Scenario { name: "start-inside", title: "starts inside a keep-out", runs: 10 },
     Scenario { name: "goal-inside", title: "the goal lies inside a keep-out", runs: 10 },
     Scenario { name: "off-field", title: "the goal lies off the field", runs: 10 },
@@ -213,6 +214,28 @@ impl Scenario {
                     sight: 0.0,
                     ..base
                 }
+            }
+            "behind-ball" => {
+                // The ball 4 m away in any direction that keeps it on the field; the robot is to stand 0.3 m behind it.
+                let start = Pose::new(even(-2.5, 0.0), even(-1.5, 1.5), even(-3.1, 3.1));
+                let away = even(-0.7, 0.7);
+                let ball = [start.x + 4.0 * away.cos(), start.y + 4.0 * away.sin()];
+                let kick = even(-1.5, 1.5);
+                let goal = Pose::new(ball[0] - 0.3 * kick.cos(), ball[1] - 0.3 * kick.sin(), kick);
+                let mut between = |share: f64| {
+                    let side = even(-0.6, 0.6);
+                    let [c, s] = [away.cos(), away.sin()];
+                    let speed = even(0.0, 0.3);
+                    let turn = even(-3.1, 3.1);
+                    // It wanders off: nobody stands on the ball for good.
+                    opponent(
+                        start.x + 4.0 * share * c - side * s,
+                        start.y + 4.0 * share * s + side * c,
+                        [speed * turn.cos(), speed * turn.sin()],
+                    )
+                };
+                let actors = vec![between(0.35), between(0.6)];
+                Setup { start, goal, actors, duration: 40.0, ..base }
             }
             "start-inside" => Setup {
                 actors: vec![opponent(from.x + 0.35, from.y + even(-0.2, 0.2), [0.0; 2])],

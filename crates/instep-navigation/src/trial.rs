@@ -71,6 +71,8 @@ pub struct Outcome {
     pub solves: Vec<f64>,
     /// s
     pub plans: Vec<f64>,
+    /// Radius that the robot adds to each keep-out, m.
+    pub radius: f64,
     /// Changes of the side.
     pub flips: usize,
     /// Why it stood, each once.
@@ -114,7 +116,7 @@ pub fn run(
     let target = if setup.corners.is_some() { Target::InTime(&in_time) } else { Target::Pose(setup.goal) };
     let goal = Goal { target, facing: setup.facing, speed: setup.speed };
     let half = navigator.problem().half;
-    let mut outcome = Outcome::default();
+    let mut outcome = Outcome { radius: setup.radius, ..Outcome::default() };
     let mut still_since = (0.0, setup.start.position());
     let ticks = (setup.duration / PERIOD).round() as usize;
     for tick in 0..ticks {
