@@ -82,8 +82,10 @@ fn normal(rng: &mut ChaCha8Rng) -> f64 {
     StandardNormal.sample(rng)
 }
 
-/// The camera's errors, and how they go on from frame to frame.
-struct Camera<'a> {
+/// A camera as a scenario says, with its errors and how they go on from frame to frame: for streams, and for whoever
+/// walks a robot and wants to know what it would see.
+#[derive(Debug, Clone)]
+pub struct Camera<'a> {
     scenario: &'a Scenario,
     noise: Noise,
     rng: ChaCha8Rng,
@@ -91,9 +93,28 @@ struct Camera<'a> {
     lasting: Vec<[f64; 2]>,
     scale: f64,
     ghosts: Vec<(f64, LandmarkClass, [f64; 2])>,
+    /// Of the last frame, s.
+    time: f64,
 }
 
-impl Camera<'_> {
+impl<'a> Camera<'a> {
+    /// Sees what is on `map`, with errors of their own for each seed.
+    pub fn new(scenario: &'a Scenario, map: &Map, seed: u64) -> Self {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        rng.set_stream(3);
+        let count = map.landmarks().len() + 2 * map.lines().len();
+        let lasting = (0..count).map(|_| [normal(&mut rng), normal(&mut rng)]).collect();
+        let scale = scenario.range_scale * normal(&mut rng);
+        Self { scenario, noise: Noise::default(), rng, lasting, scale, ghosts: Vec::new(), time: 0.0 }
+    }
+
+    /// What a robot at `pose` sees at `time`, which never runs backwards.
+    pub fn look(&mut self, map: &Map, time: f64, pose: &Pose) -> Frame {
+        self.advance(time - self.time);
+        self.time = time;
+        self.frame(map, time, pose)
+    }
+
     fn advance(&mut self, dt: f64) {
         let kept = (-dt / LASTING_TIME).exp();
         let fresh = (1.0 - kept * kept).sqrt();
@@ -235,17 +256,7 @@ impl Stream {
             rng
         };
         let (mut odometry, mut chance) = (stream(1), stream(2));
-        let mut camera = Camera {
-            scenario,
-            noise: Noise::default(),
-            rng: stream(3),
-            lasting: Vec::new(),
-            scale: 0.0,
-            ghosts: Vec::new(),
-        };
-        let count = map.landmarks().len() + 2 * map.lines().len();
-        camera.lasting = (0..count).map(|_| [normal(&mut camera.rng), normal(&mut camera.rng)]).collect();
-        camera.scale = scenario.range_scale * normal(&mut camera.rng);
+        let mut camera = Camera::new(scenario, &map, seed);
 
         let carried = (scenario.event == Event::Carried).then(|| place_to_be_carried_to(scenario, &map, &mut chance));
         let truth = |time: f64| match &carried {
@@ -265,7 +276,6 @@ impl Stream {
         let mut waiting: std::collections::VecDeque<Frame> = std::collections::VecDeque::new();
         let mut next_frame = 0.0;
         let mut before = truth(0.0);
-        let mut camera_time = 0.0;
         for k in 0..=steps {
             let time = k as f64 * dt;
             let now = truth(time);
@@ -286,9 +296,7 @@ impl Stream {
             told.push(Told::Truth(Truth { time, pose: now }));
             told.push(Told::Odometry(Step { time, motion }));
             if time >= next_frame - 1e-9 {
-                camera.advance(time - camera_time);
-                camera_time = time;
-                waiting.push_back(camera.frame(&map, time, &now));
+                waiting.push_back(camera.look(&map, time, &now));
                 next_frame += 1.0 / scenario.rate;
             }
             while waiting.front().is_some_and(|f| f.time + scenario.delay <= time + 1e-9) {

@@ -11,6 +11,7 @@ use instep_kick::KickError;
 use instep_localisation::LocalisationError;
 use instep_match::MatchError;
 use instep_motion::MotionError;
+use instep_navigation::NavigationError;
 use instep_report::ReportError;
 use instep_retarget::RetargetError;
 use instep_robot::RobotError;
@@ -88,6 +89,12 @@ impl From<FieldError> for Failure {
 
 impl From<LocalisationError> for Failure {
     fn from(error: LocalisationError) -> Self {
+        Self::input(error)
+    }
+}
+
+impl From<NavigationError> for Failure {
+    fn from(error: NavigationError) -> Self {
         Self::input(error)
     }
 }

@@ -19,7 +19,7 @@ use crate::failure::Failure;
 use crate::files;
 use crate::output::{self, Output, Paint};
 
-mod page;
+pub(crate) mod page;
 mod recording;
 
 /// The arguments of `instep locate`.

@@ -17,6 +17,7 @@ mod learn_table;
 mod locate;
 mod matches;
 mod mujoco_log;
+mod navigate;
 mod output;
 mod places;
 mod reach;
@@ -60,6 +61,8 @@ enum Command {
     Locate(locate::Locate),
     /// Play games of soccer in the game simulator and compare strategies
     Match(matches::Match),
+    /// Walk a point robot or a walking robot round others to its goal by DAVG and cf-MPC, and measure it
+    Navigate(navigate::Navigate),
     /// Turn a human kick (ASF/AMC or BVH) into a reference for a robot
     Retarget(retarget::Retarget),
     /// Look at a robot's own files
@@ -87,6 +90,7 @@ fn main() -> ExitCode {
         Command::LearnTable(table) => table.run(&output),
         Command::Locate(locate) => locate.run(&output),
         Command::Match(matches) => matches.run(&output),
+        Command::Navigate(navigate) => navigate.run(&output),
         Command::Retarget(retarget) => retarget.run(&output),
         Command::Robot(command) => command.run(&output),
         Command::Ros(ros) => ros.run(&output),

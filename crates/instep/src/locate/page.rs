@@ -91,7 +91,7 @@ fn good(is: bool) -> Verdict {
 }
 
 /// The grass with its lines.
-fn pitch(field: &Field) -> Pitch {
+pub(crate) fn pitch(field: &Field) -> Pitch {
     let f = |p: [f64; 2]| p.map(|v| v as f32);
     let lines = field.lines();
     let markings = lines.iter().map(|line| match *line {
