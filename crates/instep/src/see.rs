@@ -212,8 +212,7 @@ fn look(
     let used: Vec<Detection> = found.iter().copied().filter(|d| d.confidence >= THRESHOLD).collect();
     let radius = field.ball.radius as f32;
     let sights = sights(&camera, &scene.camera, radius, &view.frame, &view.depth, &used);
-    let obstacles =
-        proximity::nearest(&Proximity::default(), &camera, &scene.camera, &view.depth, Some(&view.frame));
+    let obstacles = proximity::nearest(&Proximity::default(), &camera, &scene.camera, &view.depth, Some(&view.frame));
     times.after.push(ms(start));
     Ok(Looked { scene, view, found, sights, obstacles })
 }
@@ -388,7 +387,10 @@ impl EvalArgs {
                 if self.out.is_some() {
                     let used: Vec<_> = looked.found.iter().copied().filter(|d| d.confidence >= THRESHOLD).collect();
                     let missed = mistakes(&used, &labels);
-                    pictures.push((missed, picture(&format!("seed {seed}: {missed} mistakes"), &looked.view, &used, &labels, None)));
+                    pictures.push((
+                        missed,
+                        picture(&format!("seed {seed}: {missed} mistakes"), &looked.view, &used, &labels, None),
+                    ));
                     pictures.sort_by(|a, b| b.0.cmp(&a.0));
                     pictures.truncate(24);
                 }
@@ -478,13 +480,7 @@ impl ProximityArgs {
 }
 
 /// A frame and its depth side by side, with boxes over them.
-fn picture(
-    title: &str,
-    view: &View,
-    found: &[Detection],
-    labels: &[label::Label],
-    looked: Option<&Looked>,
-) -> String {
+fn picture(title: &str, view: &View, found: &[Detection], labels: &[label::Label], looked: Option<&Looked>) -> String {
     let code = |png: Vec<u8>| base64::engine::general_purpose::STANDARD.encode(png);
     let colour = |class: Class| ["#ff8000", "#ffee00", "#ff40ff", "#ff3030", "#20e0ff", "#6080ff"][class.index()];
     let (w, h) = (view.frame.width, view.frame.height);
@@ -494,7 +490,11 @@ fn picture(
         let _ = write!(
             boxes,
             "<rect x='{}' y='{}' width='{}' height='{}' stroke='{}' stroke-dasharray='2 2'/>",
-            r.left, r.top, r.width(), r.height(), colour(l.class)
+            r.left,
+            r.top,
+            r.width(),
+            r.height(),
+            colour(l.class)
         );
     }
     for d in found {
@@ -503,7 +503,14 @@ fn picture(
         let _ = write!(
             boxes,
             "<rect x='{:.1}' y='{:.1}' width='{:.1}' height='{:.1}' stroke='{c}'/><text x='{:.1}' y='{:.1}' fill='{c}'>{} {:.2} {team}</text>",
-            r.left, r.top, r.width(), r.height(), r.left, (r.top - 2.0).max(8.0), d.class.name(), d.confidence,
+            r.left,
+            r.top,
+            r.width(),
+            r.height(),
+            r.left,
+            (r.top - 2.0).max(8.0),
+            d.class.name(),
+            d.confidence,
             c = colour(d.class)
         );
     }
@@ -515,7 +522,13 @@ fn picture(
             let _ = write!(
                 near,
                 "<rect x='{}' y='{}' width='{}' height='{}' stroke='#fff'/><text x='{}' y='{}' fill='#fff'>{:.2} m</text>",
-                r.left, r.top, r.width(), r.height(), r.left + 2.0, r.top + 10.0, o.depth
+                r.left,
+                r.top,
+                r.width(),
+                r.height(),
+                r.left + 2.0,
+                r.top + 10.0,
+                o.depth
             );
         }
         if let Some((ball, confidence)) = &looked.sights.ball {
@@ -529,7 +542,9 @@ fn picture(
         let _ = write!(said, "{} landmarks, {} robots", looked.sights.landmarks.len(), looked.sights.robots.len());
     }
     let one = |png: String, over: &str| {
-        format!("<svg viewBox='0 0 {w} {h}'><image href='data:image/png;base64,{png}' width='{w}' height='{h}'/>{over}</svg>")
+        format!(
+            "<svg viewBox='0 0 {w} {h}'><image href='data:image/png;base64,{png}' width='{w}' height='{h}'/>{over}</svg>"
+        )
     };
     let frame = one(code(view.frame.png()), &boxes);
     let depth = one(code(view.depth.picture(10.0).png()), &near);
