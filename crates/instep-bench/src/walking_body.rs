@@ -83,7 +83,7 @@ impl WalkingBody {
         let far_ball = BallState::at_rest([1000.0, 0.0, settings.ball.radius]);
         world.reset(&robot.stand, &vec![0.0; robot.nv()], &far_ball)?;
         let walker = Walker::load(Arc::clone(robot))?;
-        let mut suite = SensorSuite::new(&world, seed);
+        let mut suite = SensorSuite::new(&mut world, seed);
         suite.sense(&world);
         let unusable = |e: &dyn std::fmt::Display| BenchError::File { file: field.name.clone(), detail: e.to_string() };
         let sight = if sees {

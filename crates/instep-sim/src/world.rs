@@ -548,7 +548,7 @@ impl World {
     #[must_use]
     pub fn heading(&self) -> Isometry3<f64> {
         let q = self.q();
-        let yaw = crate::sensors::orientation(q).euler_angles().2;
+        let yaw = orientation(q).euler_angles().2;
         Isometry3::new(Vector3::new(q[0], q[1], 0.0), Vector3::z() * yaw)
     }
 
