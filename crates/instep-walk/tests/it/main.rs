@@ -11,3 +11,4 @@
 mod rig;
 
 mod gait;
+mod in_gait;
