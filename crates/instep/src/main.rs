@@ -23,6 +23,7 @@ mod reach;
 mod retarget;
 mod robot;
 mod ros;
+mod see;
 mod train;
 mod tune;
 mod walk;
@@ -67,6 +68,8 @@ enum Command {
     Robot(robot::RobotCommand),
     /// Offer the kick as a ROS 2 action, for a real or a simulated robot; no ROS has to be installed
     Ros(ros::Ros),
+    /// Look through a robot's camera: frames, detector, ball, landmarks, obstacles; its sets, training and measures
+    See(see::See),
     /// Train a policy that follows a reference, or that kicks the ball with it
     Train(train::Train),
     /// Find an engine's settings for a robot by CMA-ES
@@ -90,6 +93,7 @@ fn main() -> ExitCode {
         Command::Retarget(retarget) => retarget.run(&output),
         Command::Robot(command) => command.run(&output),
         Command::Ros(ros) => ros.run(&output),
+        Command::See(see) => see.run(&output),
         Command::Train(train) => train.run(&output),
         Command::Tune(tune) => tune.run(&output),
         Command::Walk(walk) => walk.run(&output),

@@ -1,0 +1,137 @@
+//! From a frame to boxes: the network's peaks, their rest and size, doubles taken out.
+
+use std::path::Path;
+
+use crate::PerceptionError;
+use crate::class::{Class, Team};
+use crate::label::Rect;
+use crate::net::{file, shape};
+use crate::picture::Frame;
+use crate::train::loss::{GRID, regression};
+
+/// What was found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Detection {
+    /// What it is.
+    pub class: Class,
+    /// Where it is, pixels.
+    pub rect: Rect,
+    /// Confidence, 0 to 1.
+    pub confidence: f32,
+    /// A robot's team by its hue, where one can be told.
+    pub team: Option<Team>,
+}
+
+/// Two boxes of one class that overlap more are one.
+const SAME: f32 = 0.55;
+
+/// A network with its buffers.
+#[derive(Debug, Clone)]
+pub struct Detector {
+    weights: Vec<f32>,
+    tape: shape::Tape,
+    planes: Vec<f32>,
+}
+
+impl Detector {
+    /// Of a flat vector of parameters of [`shape::parameters`] numbers.
+    pub fn new(weights: Vec<f32>) -> Self {
+        Detector { weights, tape: shape::Tape::new(), planes: Vec::new() }
+    }
+
+    /// Reads a detector's file.
+    ///
+    /// # Errors
+    /// [`PerceptionError::File`] naming the file and what in it does not fit.
+    pub fn load(path: &Path) -> Result<Self, PerceptionError> {
+        Ok(Self::new(file::read(path, &[])?.0))
+    }
+
+    /// All peaks above `threshold`, the most confident first.
+    ///
+    /// # Errors
+    /// [`PerceptionError::Size`] for a frame of another size than the network's.
+    pub fn detect(&mut self, frame: &Frame, threshold: f32) -> Result<Vec<Detection>, PerceptionError> {
+        let [width, height] = shape::INPUT;
+        if (frame.width, frame.height) != (width, height) || frame.rgb.len() != 3 * width * height {
+            return Err(PerceptionError::Size { found_width: frame.width, found_height: frame.height, width, height });
+        }
+        shape::image(&frame.rgb, &mut self.planes);
+        shape::forward(&self.weights, &self.planes, &mut self.tape);
+        let mut found = peaks(self.tape.output(), threshold);
+        for detection in found.iter_mut().filter(|d| d.class == Class::Robot) {
+            detection.team = team(frame, &detection.rect);
+        }
+        Ok(found)
+    }
+}
+
+/// The peaks of the heat maps.
+fn peaks(output: &[f32], threshold: f32) -> Vec<Detection> {
+    let [columns, rows] = GRID;
+    let cells = columns * rows;
+    let least = (threshold / (1.0 - threshold).max(1e-6)).ln();
+    let frame = Rect { left: 0.0, top: 0.0, right: shape::INPUT[0] as f32, low: shape::INPUT[1] as f32 };
+    let mut found = Vec::new();
+    for class in Class::ALL {
+        let heat = &output[class.index() * cells..(class.index() + 1) * cells];
+        for (cell, &z) in heat.iter().enumerate().filter(|(_, z)| **z > least) {
+            let (row, column) = (cell / columns, cell % columns);
+            let around = (row.saturating_sub(1)..(row + 2).min(rows))
+                .flat_map(|r| (column.saturating_sub(1)..(column + 2).min(columns)).map(move |c| r * columns + c));
+            if around.into_iter().any(|other| heat[other] > z || (heat[other] == z && other < cell)) {
+                continue;
+            }
+            let value = |k: usize| output[(regression(class) + k) * cells + cell];
+            let unit = shape::CELL as f32;
+            let middle = [(column as f32 + 0.5 + value(0)) * unit, (row as f32 + 0.5 + value(1)) * unit];
+            let side = |k: usize| shape::UNIT * value(k).clamp(-4.0, 4.0).exp();
+            let rect = Rect::around(middle, side(2), side(3)).meet(&frame);
+            if rect.area() > 0.0 {
+                found.push(Detection { class, rect, confidence: 1.0 / (1.0 + (-z).exp()), team: None });
+            }
+        }
+    }
+    found.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
+    let mut kept: Vec<Detection> = Vec::with_capacity(found.len());
+    for detection in found {
+        if kept.iter().all(|k| k.class != detection.class || k.rect.iou(&detection.rect) < SAME) {
+            kept.push(detection);
+        }
+    }
+    kept
+}
+
+/// The team of a robot by the hues in the middle of its box: the colour with more strong pixels, at least 2 % of them.
+pub fn team(frame: &Frame, rect: &Rect) -> Option<Team> {
+    let (mut red, mut blue, mut all) = (0u32, 0u32, 0u32);
+    let inset = 0.15 * rect.width();
+    for y in (rect.top.max(0.0) as usize)..(rect.low.max(0.0) as usize).min(frame.height) {
+        for x in ((rect.left + inset).max(0.0) as usize)..((rect.right - inset).max(0.0) as usize).min(frame.width) {
+            let [r, g, b] = frame.pixel(x, y).map(i32::from);
+            all += 1;
+            red += u32::from(r > g + 40 && r > b + 30);
+            blue += u32::from(b > r + 30 && b > g + 15);
+        }
+    }
+    let enough = all / 50 + 1;
+    match (red >= enough, blue >= enough) {
+        (true, _) if red > blue => Some(Team::Red),
+        (_, true) => Some(Team::Blue),
+        _ => None,
+    }
+}
+
+/// Confidence above which the shipped detector's finds are used.
+pub const THRESHOLD: f32 = 0.4;
+
+impl Detector {
+    /// The detector that comes with Instep (`detector.md` is its card).
+    ///
+    /// # Errors
+    /// Never for a program as it was built; the file is checked as any other.
+    pub fn shipped() -> Result<Self, PerceptionError> {
+        let bytes = include_bytes!("../detector.safetensors");
+        Ok(Self::new(file::parse(bytes, Path::new("detector.safetensors"), &[])?.0))
+    }
+}
