@@ -131,7 +131,7 @@ mod tests {
             found: vec![found(20.0, 0.9), found(60.0, 0.8)],
             labels: vec![label(20.0, false), label(60.0, false)],
         };
-        let r = row(&[perfect.clone()], Class::Ball, 0.5);
+        let r = row(std::slice::from_ref(&perfect), Class::Ball, 0.5);
         assert_eq!((r.precision, r.recall, r.map50, r.map50_95), (1.0, 1.0, 1.0, 1.0));
         let mut worse = perfect;
         worse.found.insert(0, found(200.0, 0.95));

@@ -160,7 +160,7 @@ fn obstacle(camera: &Camera, pose: &CameraPose, rect: Rect, depth: f32, frame: O
 
 /// The 8-connected components of a mask with `columns` in a row, each as its pixels.
 pub fn components(mask: &[bool], columns: usize) -> Vec<Vec<usize>> {
-    let rows = if columns == 0 { 0 } else { mask.len() / columns };
+    let rows = mask.len().checked_div(columns).unwrap_or(0);
     let mut seen = vec![false; mask.len()];
     let (mut parts, mut open) = (Vec::new(), Vec::new());
     for start in 0..rows * columns {

@@ -39,9 +39,9 @@ pub(crate) fn check_file(file: &Path) -> Result<(), Failure> {
     check_folder(parent(file))
 }
 
-/// `file`, with `ending` where its name has none.
+/// `file`, with `ending` where its name has none; a folder is left for [`check_file`] to refuse.
 pub(crate) fn with_ending(file: &Path, ending: &str) -> PathBuf {
-    if file.extension().is_some() { file.to_owned() } else { file.with_extension(ending) }
+    if file.extension().is_some() || file.is_dir() { file.to_owned() } else { file.with_extension(ending) }
 }
 
 fn parent(file: &Path) -> &Path {

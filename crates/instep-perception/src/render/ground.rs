@@ -178,7 +178,7 @@ fn wall(look: &Look, eye: Vector3<f32>, ray: Vector3<f32>, shade: f32) -> ([f32;
     let place = eye + ray * t;
     let seed = look.texture as i32;
     if tz <= tx && tz <= ty {
-        let lamp = hash((place.x / 2.0).floor() as i32, (place.y / 0.8).floor() as i32, seed) % 5 == 0;
+        let lamp = hash((place.x / 2.0).floor() as i32, (place.y / 0.8).floor() as i32, seed).is_multiple_of(5);
         return (if lamp { [2.0; 3] } else { look.ceiling.map(|c| c * shade) }, t);
     }
     let along = if tx < ty { place.y } else { place.x };

@@ -16,7 +16,7 @@ pub(super) struct Noise {
 
 impl Noise {
     pub(super) fn new() -> Self {
-        let mut rng = ChaCha8Rng::seed_from_u64(0x6e6f_6973_65);
+        let mut rng = ChaCha8Rng::seed_from_u64(0x006e_6f69_7365);
         let grain: Vec<f32> = (0..SIDE * SIDE).map(|_| rng.random_range(-1.0..1.0)).collect();
         // Two octaves of bilinear noise.
         let at = |x: usize, y: usize| grain[(y % SIDE) * SIDE + x % SIDE];

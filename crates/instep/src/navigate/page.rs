@@ -60,6 +60,7 @@ pub(super) fn page(table: &Table, title: &str, field: &Field, groups: &[&[Outcom
         Some(Series::points(row.name, points.collect()))
     });
     Report {
+        matrix: None,
         title: format!("How do I get there: {}", table.scenario),
         subtitle: format!("{title} \u{b7} {} \u{b7} {} runs, seed {} \u{b7} the replay shows the first run of {}", table.robot, row.runs, table.seed, row.name),
         summary,
