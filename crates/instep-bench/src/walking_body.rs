@@ -25,7 +25,7 @@ use crate::walking::{PERIOD, heading};
 
 /// Frames of the camera a second.
 const FRAMES: f64 = 20.0;
-/// How a walking robot answers: lag and delay of its mean velocity, s (`docs/navigate.md` says how they were found).
+/// How a walking robot answers: lag and delay of its mean velocity, s : guesses, not yet fitted to measured steps.
 const ANSWER: [f64; 2] = [0.3, 0.15];
 
 /// What the robot sees by, and what it makes of it.

@@ -19,7 +19,7 @@ fn kick(ball: [f64; 2], direction: f64, speed: f64) -> ([f64; 2], bool) {
     let mut world = world(&robot);
     world.reset(&robot.stand, &vec![0.0; robot.nv()], &BallState::at_rest([ball[0], ball[1], 0.11])).unwrap();
     let mut kick = InGait::new(Arc::clone(&robot), WalkSettings::load(&robot).unwrap(), settings, 0.11).unwrap();
-    let mut suite = SensorSuite::new(&world, 5);
+    let mut suite = SensorSuite::new(&mut world, 5);
     suite.sense(&world);
     let (mut sensors, mut command) = (Sensors::default(), JointCommand::zeros(robot.joints.len()));
     kick.ask(Aim { ball, direction, speed, foot: None });
