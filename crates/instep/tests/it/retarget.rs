@@ -44,7 +44,8 @@ fn a_clip_becomes_a_reference_that_can_be_kicked_with() {
     let reference = Reference::load(&path).unwrap();
     assert_eq!((reference.robot.as_str(), reference.rate), ("prestoe", 30.0));
     assert_eq!(reference.source.clip, "kick_01.amc");
-    let kick = ["kick", "--reference", path.to_str().unwrap(), "--duration", "0.2", "--json"];
+    // The ball lies ahead: at the clip's own place it would start inside a foot.
+    let kick = ["kick", "--reference", path.to_str().unwrap(), "--duration", "0.2", "--ball", "1.0,0.0", "--json"];
     object(&instep(folder.path(), &kick));
 }
 

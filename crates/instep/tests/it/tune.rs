@@ -48,7 +48,7 @@ fn what_cannot_be_tuned_is_refused_with_its_place() {
     let before = listing(folder.path());
     for (arguments, words) in [
         (vec!["tune", "previw", "--robot", "nao", "--tuning", "t.toml"], &["previw", "preview"][..]),
-        (vec!["tune", "preview", "--robot", "prestoe", "--tuning", "t.toml"], &["prestoe", "preview.toml"]),
+        (vec!["tune", "preview-tuned", "--robot", "prestoe", "--tuning", "t.toml"], &["prestoe", "preview-tuned.toml"]),
         (vec!["tune", "preview", "--robot", "nao", "--tuning", "no.toml"], &["no.toml", "--tuning"]),
         (arguments(&["--out", "t.toml"]), &["t.toml"]),
         (arguments(&["--resume"]), &["checkpoint.json", "cannot be read"]),
