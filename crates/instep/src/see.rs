@@ -391,7 +391,7 @@ impl EvalArgs {
                         missed,
                         picture(&format!("seed {seed}: {missed} mistakes"), &looked.view, &used, &labels, None),
                     ));
-                    pictures.sort_by(|a, b| b.0.cmp(&a.0));
+                    pictures.sort_by_key(|picture| std::cmp::Reverse(picture.0));
                     pictures.truncate(24);
                 }
                 judged.push(Judged { found: looked.found, labels });
