@@ -10,6 +10,7 @@
 
 pub mod approach;
 mod error;
+pub mod estimate;
 pub mod footsteps;
 pub mod gait;
 pub mod odometry;
