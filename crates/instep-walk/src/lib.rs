@@ -11,6 +11,7 @@
 
 pub mod approach;
 mod error;
+pub mod estimate;
 pub mod footsteps;
 pub mod gait;
 pub mod in_gait;
