@@ -204,7 +204,8 @@ fn walk(seed: u64, seconds: f64) -> ([f64; 2], f64, f64) {
 #[test]
 fn is_consistent_over_random_walks() {
     let walks: Vec<_> = (0..24).map(|seed| walk(seed, 6.0)).collect();
-    let mean = |f: &dyn Fn(&([f64; 2], f64, f64)) -> f64| walks.iter().map(f).sum::<f64>() / walks.len() as f64;
+    type Walk = ([f64; 2], f64, f64);
+    let mean = |f: &dyn Fn(&Walk) -> f64| walks.iter().map(f).sum::<f64>() / walks.len() as f64;
     let (whole, of_velocity) = (mean(&|w| w.0[0]), mean(&|w| w.0[1]));
     let velocity = mean(&|w| w.1 * w.1).sqrt();
     println!(
