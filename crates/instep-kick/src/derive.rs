@@ -332,6 +332,27 @@ mod tests {
     const SMALL: Build = Build { leg: 0.25, half_sole_width: 0.04, hip_load: 0.5, ball_radius: 0.05, tick: 0.012 };
     const TALL: Build = Build { leg: 0.9, half_sole_width: 0.0, hip_load: 1.2, ball_radius: 0.11, tick: 0.004 };
 
+    fn build(name: &str) -> Build {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots").join(name);
+        let robot = Robot::load(&folder).unwrap();
+        Build::of(&robot, &BallModel::load(&folder).unwrap())
+    }
+
+    /// Against what the cards say: NAO's thigh, tibia and foot height; T1's thigh from the hip's pitch axis, shank, ankle and sole.
+    #[test]
+    fn a_build_is_measured_on_the_robot() {
+        let (nao, t1, k1) = (build("nao"), build("t1"), build("k1"));
+        assert!((nao.leg - (0.1 + 0.1029 + 0.04519)).abs() < 1e-3, "{nao:?}");
+        let thigh = (0.02_f64 + 0.081854 + 0.134).hypot(0.014);
+        assert!((t1.leg - (thigh + 0.28 + 0.012 + 0.03)).abs() < 2e-3, "{t1:?}");
+        assert!((t1.half_sole_width - 0.045).abs() < 1e-9 && t1.ball_radius == 0.11, "{t1:?}");
+        // A servo's engine ticks with its bus, one with fast drives at the slowest tick.
+        assert_eq!((nao.tick, t1.tick), (0.012, SLOWEST_TICK));
+        // T1's weak hip roll makes the base roll, K1's strong one does not.
+        assert!(t1.hip_load > 0.8 && k1.hip_load < 0.6, "{t1:?} {k1:?}");
+        assert!(DynamicSettings::derive(&t1).stance.roll > 0.05 && DynamicSettings::derive(&k1).stance.roll == 0.0);
+    }
+
     #[test]
     fn every_build_has_settings_that_can_be() {
         for build in [SMALL, TALL] {
