@@ -301,8 +301,8 @@ pub fn open_goal(scene: &Scene, opponent_reach: f64, spread: f64, whole: bool) -
     let shadow = |o: &Circle| {
         let d = distance(o.center, ball);
         let wide = o.radius + radius + opponent_reach;
-        let before =
-            o.center[0] > ball[0] && o.center[0] < goal.center[0] + o.radius && d < distance(goal.center, ball) + 1.0;
+        // Whoever stands beside the goal casts a shadow beside it, which no gap meets.
+        let before = o.center[0] > ball[0] && o.center[0] < goal.center[0] + o.radius;
         let half = (wide / d.max(1e-9)).min(1.0).asin();
         before.then(|| (bearing(ball, o.center) - half, bearing(ball, o.center) + half))
     };
@@ -439,6 +439,17 @@ mod tests {
             let found = open_goal(&scene, 0.0, 0.1, false).map_or(0.0, |t| 2.0 * t.tolerance);
             prop_assert!((found - widest).abs() < 2e-3, "found {found}, swept {widest}");
         }
+    }
+
+    /// Found by the sweep above: from the corner an opponent in front of the far post is farther than the goal and blocks all the same.
+    #[test]
+    fn an_opponent_before_the_far_post_blocks_from_the_corner() {
+        let field = Field::named("adult-2024").unwrap();
+        let opponents = [Circle { center: [6.87, 1.56], radius: 0.25 }];
+        let open = |opponents: &[Circle]| {
+            open_goal(&scene(&field, [5.76, -2.82], opponents), 0.0, 0.1, false).map_or(0.0, |target| target.tolerance)
+        };
+        assert!(open(&opponents) < open(&[]) - 0.01, "{} {}", open(&opponents), open(&[]));
     }
 
     #[test]
