@@ -120,6 +120,35 @@ fn feed_forward_reaches_a_torque_drive_late_and_a_position_servo_never() {
     assert_eq!(nudged("wolfgang", Fidelity::AsBuilt), None);
 }
 
+/// What is left after 20 ms of an elbow's 2 rad/s, rad/s, with a drive that does nothing, for a dry (N m) and a viscous (N m s/rad)
+/// friction.
+fn coasting(dry: f64, viscous: f64) -> f64 {
+    let mut robot = (*robot("prestoe")).clone();
+    let elbow = robot.joints.iter().position(|joint| joint.name.contains("lbow")).unwrap();
+    let joint = &mut robot.joints[elbow];
+    (joint.kp, joint.kd, joint.static_friction, joint.viscous_friction) = (0.0, 0.0, dry, viscous);
+    let (mut q, mut v) = (robot.stand.clone(), vec![0.0; robot.nv()]);
+    q[2] += 2.0;
+    v[6 + elbow] = 2.0;
+    let settings = WorldSettings { drives: Fidelity::AsBuilt, ..WorldSettings::default() };
+    let mut command = JointCommand::zeros(robot.joints.len());
+    command.positions.copy_from_slice(&q[7..]);
+    let mut world = World::new(robot.into(), &settings).unwrap();
+    world.reset(&q, &v, &BallState::at_rest([5.0, 0.0, 0.11])).unwrap();
+    while world.time() < 0.0199 {
+        world.advance(&command, None).unwrap();
+    }
+    world.v()[6 + elbow]
+}
+
+#[test]
+fn joints_have_dry_and_viscous_friction() {
+    let (free, dry, viscous) = (coasting(0.0, 0.0), coasting(0.3, 0.0), coasting(0.0, 0.15));
+    // 0.3 N m either way at 2 rad/s; the viscous one wanes with the speed.
+    assert!(dry < free - 0.1 && viscous < free - 0.1, "{free}, {dry}, {viscous} rad/s");
+    assert!(viscous > dry, "{dry}, {viscous} rad/s");
+}
+
 /// Something outside drives a joint past its speed limit: the trial says which, how far and when.
 #[test]
 fn a_joint_beyond_its_speed_limit_is_reported() {
