@@ -70,7 +70,7 @@ function createMatrix(root, matrix) {
     }
   }
   picker.addEventListener("change", () => pick(Number(picker.value)));
-  details.append(make("p", "hint", "Click a cell for all that was measured there."));
+  details.append(make("p", "prompt", "Click a cell for all that was measured there."));
   root.append(head, frame, details);
   pick(0);
   // #measure=3 shows another measure, #cell=5 opens a cell: for links and screenshots.
