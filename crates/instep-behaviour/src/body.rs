@@ -202,6 +202,7 @@ impl Body {
         let Some(request) = choose(pitch.kicks, ball, &target) else { return };
         let kick = &pitch.kicks[request.kick];
         decision.target = Some(target);
+        decision.prepared = Some(KickRequest { precision: target.tolerance, ..request });
         let moment = is_time(kick, &request, own, &beliefs.ball);
         let seen = beliefs.ball.age(beliefs.time) < 1.0;
         let mut pose = stance(kick, ball, request.direction);

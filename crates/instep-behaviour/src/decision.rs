@@ -111,6 +111,8 @@ pub struct Decision {
     pub motion: Motion,
     /// A kick, once its moment has come.
     pub kick: Option<KickRequest>,
+    /// The kick that the approach prepares; its moment need not have come.
+    pub prepared: Option<KickRequest>,
     /// Where the ball shall go.
     pub target: Option<Target>,
     /// The neck.

@@ -62,6 +62,7 @@ impl Player {
             role,
             motion: Motion::Stand,
             kick: None,
+            prepared: None,
             target: None,
             gaze: self.neck.update(beliefs),
             ball: beliefs.ball.state,

@@ -234,6 +234,19 @@ impl InGait {
         &self.walker
     }
 
+    /// The walker, to be steered while no kick is under way.
+    pub fn walker_mut(&mut self) -> &mut Walker {
+        &mut self.walker
+    }
+
+    /// Hands the walker back as it walks: no stop, no kick. A kick that has begun is made first.
+    pub fn release(&mut self) {
+        if self.stage != Stage::Kick {
+            self.commander.cancel();
+            (self.aim, self.ball, self.stage) = (None, None, Stage::Idle);
+        }
+    }
+
     /// The settings.
     #[must_use]
     pub fn settings(&self) -> &InGaitSettings {
