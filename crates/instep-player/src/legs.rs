@@ -11,7 +11,7 @@ use instep_robot::control::{Controller, JointCommand, Sensors};
 use instep_walk::gait::Mode;
 use instep_walk::in_gait::{Aim, InGait, InGaitSettings, Stage as KickStage};
 use instep_walk::settings::Limits;
-use instep_walk::{Velocity, WalkError, WalkSettings, Walker};
+use instep_walk::{StateEstimate, Velocity, WalkError, WalkSettings, Walker};
 use serde::Serialize;
 
 /// From this tilt on, a robot that lay stands again, rad.
@@ -209,8 +209,8 @@ impl Legs {
         }
     }
 
-    /// One tick with senses that may be believed.
-    pub fn tick(&mut self, sensors: &Sensors, command: &mut JointCommand) {
+    /// One tick with senses that may be believed; a `state` that is told overrules the walker's own estimate.
+    pub fn tick(&mut self, sensors: &Sensors, state: Option<&StateEstimate>, command: &mut JointCommand) {
         let tilt = tilt(&sensors.orientation);
         if self.stage == Stage::Down {
             self.lie(sensors, tilt, command);
@@ -222,6 +222,12 @@ impl Legs {
             self.stage = Stage::Down;
             self.lie(sensors, tilt, command);
             return;
+        }
+        if let Some(state) = state {
+            match &mut self.gear {
+                Gear::Walk(walker) => walker.tell(state),
+                Gear::Kick(kick) => kick.walker_mut().tell(state),
+            }
         }
         match &mut self.gear {
             Gear::Walk(walker) => walker.tick(sensors, command),

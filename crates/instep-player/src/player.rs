@@ -227,7 +227,7 @@ impl Player {
             let [x, y] = ball.position;
             Some(BallObservation { time: sights.time, position: [x, y, ball.height] })
         });
-        self.legs.tick(&self.sensors, &mut self.output.command);
+        self.legs.tick(&self.sensors, senses.state.as_ref(), &mut self.output.command);
         if self.legs.take_interruption() {
             self.place.interrupt();
         }

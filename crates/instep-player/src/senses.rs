@@ -5,6 +5,7 @@ use instep_behaviour::{GameState, MAX_TEAM};
 use instep_field::Pose;
 use instep_localisation::{LineSight, Sight};
 use instep_robot::control::Sensors;
+use instep_walk::StateEstimate;
 
 use crate::Message;
 
@@ -18,6 +19,8 @@ pub struct Senses {
     pub sights: Option<Sights>,
     /// A pose that the league tells, where it does.
     pub fix: Option<Fix>,
+    /// The body's state, where the league tells more of it than the own senses do: it overrules walking's estimator.
+    pub state: Option<StateEstimate>,
     /// The game, as the own team sees it.
     pub game: GameState,
     /// What mates said since the tick before.
