@@ -16,6 +16,8 @@ use crate::senses::{Fix, Sights};
 const STEP: f64 = 0.02;
 /// Odometry that is kept for frames that come late, s.
 const KEPT: f64 = 1.0;
+/// Faster than this, m/s, the odometry has broken, not the robot moved.
+const FASTEST: f64 = 5.0;
 /// A fix older than this is carried no farther, s.
 const FIX_HOLDS: f64 = 1.0;
 /// How much of a fixed pose's certainty an interrupted odometry costs: m, rad.
@@ -84,7 +86,15 @@ impl Place {
         if time - before < STEP - 1e-9 {
             return;
         }
-        self.tell(&Step { time, motion: from.relative(&odometry) });
+        let motion = from.relative(&odometry);
+        if motion.x.hypot(motion.y) > FASTEST * (time - before) {
+            self.trail.clear();
+            self.trail.push_back((time, odometry));
+            self.last = Some((time, odometry));
+            self.refused += 1;
+            return;
+        }
+        self.tell(&Step { time, motion });
         self.last = Some((time, odometry));
         while self.trail.front().is_some_and(|first| first.0 < time - KEPT) {
             self.trail.pop_front();

@@ -98,7 +98,7 @@ impl Default for Tuning {
             walk_delay: 0.1,
             walk_lag: 0.4,
             radius: 0.3,
-            round_ball: 0.5,
+            round_ball: 0.45,
             fallen_tilt: 1.0,
             sight_range: 9.0,
             push: PushSettings::default(),

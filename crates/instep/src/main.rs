@@ -20,6 +20,7 @@ mod mujoco_log;
 mod navigate;
 mod output;
 mod places;
+mod rcss;
 mod reach;
 mod retarget;
 mod robot;
@@ -64,6 +65,8 @@ enum Command {
     Match(matches::Match),
     /// Walk a point robot or a walking robot round others to its goal by DAVG and cf-MPC, and measure it
     Navigate(navigate::Navigate),
+    /// Play on a running RCSSServerMJ, the simulation league's MuJoCo server: one player or a whole team
+    Rcss(rcss::Rcss),
     /// Turn a human kick (ASF/AMC or BVH) into a reference for a robot
     Retarget(retarget::Retarget),
     /// Look at a robot's own files
@@ -94,6 +97,7 @@ fn main() -> ExitCode {
         Command::Locate(locate) => locate.run(&output),
         Command::Match(matches) => matches.run(&output),
         Command::Navigate(navigate) => navigate.run(&output),
+        Command::Rcss(rcss) => rcss.run(&output),
         Command::Retarget(retarget) => retarget.run(&output),
         Command::Robot(command) => command.run(&output),
         Command::Ros(ros) => ros.run(&output),
