@@ -26,6 +26,18 @@ pub enum SimError {
         /// MuJoCo's message.
         detail: String,
     },
+    /// A robot cannot stand where it is to start.
+    #[error("robot {robot} ({name}): {found}; expected {expected}")]
+    Place {
+        /// Which, from 0, in the order in which they enter.
+        robot: usize,
+        /// Its name.
+        name: String,
+        /// Where it would stand.
+        found: String,
+        /// What would be right.
+        expected: String,
+    },
     /// The start state does not fit the robot.
     #[error("start state: {found}; expected {expected}")]
     State {

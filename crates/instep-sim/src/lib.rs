@@ -3,7 +3,8 @@
 //!
 //! - [`settings`]: every constant of the physics, with unit, range and effect.
 //! - [`contact_law`]: how contact time and restitution become MuJoCo's stiffness and damping.
-//! - [`World`]: steps the physics, finely while the ball is near a foot; enforces torque and speed limits.
+//! - [`World`]: steps the physics, finely while the ball is near a foot; enforces torque and speed limits. One robot, or any
+//!   number of them on a field with [`goal`]s.
 //! - [`sensors`]: what a controller may see.
 //! - [`ball`]: the balls that robots play, and what slows them.
 //! - [`impact`]: what happened between robot and ball; [`audit`]: whether to believe it.
@@ -18,6 +19,7 @@ pub mod audit;
 pub mod ball;
 pub mod contact_law;
 mod error;
+pub mod goal;
 pub mod impact;
 mod model;
 pub mod rate;
@@ -30,4 +32,4 @@ mod world;
 
 pub use error::SimError;
 pub use rate::{NamedRate, Rate};
-pub use world::{BallState, Steps, World};
+pub use world::{BallState, Entrant, Steps, View, World};

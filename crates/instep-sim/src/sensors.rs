@@ -12,7 +12,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use crate::settings::{Fidelity, SensorNoise};
 use crate::sights::Sights;
-use crate::world::World;
+use crate::world::{View, World};
 
 /// The stream of chance from which the sensors' faults are drawn.
 const FAULTS: u64 = 7;
@@ -58,6 +58,8 @@ impl Faults {
 /// The sensors of one robot, with the readings that are still under way.
 #[derive(Debug, Clone)]
 pub struct SensorSuite {
+    /// Whose they are in the world.
+    who: usize,
     senses: SenseSettings,
     faults: Faults,
     /// Beside the senses' own.
@@ -82,17 +84,25 @@ pub struct SensorSuite {
 }
 
 impl SensorSuite {
-    /// Fits `world`'s robot with its sensors; what is wrong with them and the noise are drawn from `seed`. The drives share the
-    /// encoders.
+    /// Fits `world`'s (first) robot with its sensors; what is wrong with them and the noise are drawn from `seed`. The drives
+    /// share the encoders.
     pub fn new(world: &mut World, seed: u64) -> Self {
+        Self::of(world, 0, seed)
+    }
+
+    /// Fits robot `who` of `world` likewise.
+    ///
+    /// # Panics
+    /// When there is no such robot.
+    pub fn of(world: &mut World, who: usize, seed: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let robot = std::sync::Arc::clone(world.robot());
+        let robot = std::sync::Arc::clone(world.on(who).robot());
         let (noise, tick) = (world.settings().sensors, world.settings().step.tick);
         let as_built = world.settings().senses == Fidelity::AsBuilt;
         let senses = if as_built { robot.senses.clone() } else { SenseSettings::default() };
         // Drawn apart from the noise, so that each leaves the other as it is.
         let faults = Faults::draw(&robot, &senses, &mut stream(seed, FAULTS));
-        world.set_encoder_offsets(&faults.encoders);
+        world.set_encoder_offsets(who, &faults.encoders);
         let sights = robot
             .camera
             .filter(|_| as_built)
@@ -117,6 +127,7 @@ impl SensorSuite {
             ..noise
         };
         Self {
+            who,
             noise,
             noisy: SensorNoise { delay: 0.0, ball_delay: 0.0, ..noise } != SensorNoise::default(),
             rng,
@@ -138,6 +149,7 @@ impl SensorSuite {
     /// Reads every sensor whose turn it is; to be called after each tick, and once at the start.
     pub fn sense(&mut self, world: &World) {
         let first = self.imu_velocity.is_none();
+        let world = &world.on(self.who);
         let robot = world.robot();
         let (q, v, tick) = (world.q(), world.v(), world.settings().step.tick);
         let world_from_base = orientation(q);
@@ -195,7 +207,7 @@ impl SensorSuite {
         now.accelerometer = [0, 1, 2].map(|k| specific[k] + faults.accelerometer[k] + draw(noise.accelerometer));
         let error = UnitQuaternion::from_scaled_axis(Vector3::from([0, 1, 2].map(|_| draw(noise.orientation))));
         let drift = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), faults.yaw_rate * world.time());
-        let estimate = drift * world_from_base * UnitQuaternion::from_scaled_axis(faults.tilt) * error;
+        let estimate = drift * from_start(world) * world_from_base * UnitQuaternion::from_scaled_axis(faults.tilt) * error;
         now.orientation = [estimate.w, estimate.i, estimate.j, estimate.k];
 
         world.contact_forces_into(&mut self.forces);
@@ -247,6 +259,15 @@ fn stream(seed: u64, number: u64) -> ChaCha8Rng {
     rng
 }
 
+/// The heading at the start, of which the inertial sensor knows nothing, undone; nothing where it was along x.
+fn from_start(world: &View<'_>) -> UnitQuaternion<f64> {
+    let start = orientation(world.start());
+    if start == orientation(&world.robot().stand) {
+        return UnitQuaternion::identity();
+    }
+    UnitQuaternion::from_axis_angle(&Vector3::z_axis(), -start.euler_angles().2)
+}
+
 /// The nearest multiple of `step`, where it is not zero.
 fn coarse(value: f64, step: f64) -> f64 {
     if step > 0.0 { (value / step).round() * step } else { value }
@@ -258,7 +279,7 @@ pub(crate) fn orientation(q: &[f64]) -> UnitQuaternion<f64> {
 }
 
 /// Centre of pressure of each foot in its sole frame, m.
-fn centre_of_pressure(robot: &Robot, world: &World, forces: &[f64]) -> [Option<[f64; 2]>; 2] {
+fn centre_of_pressure(robot: &Robot, world: &View<'_>, forces: &[f64]) -> [Option<[f64; 2]>; 2] {
     let mut feet = [None; 2];
     for (foot, leg) in feet.iter_mut().zip(&robot.legs) {
         let (position, matrix) = world.link_pose(leg.sole.link);

@@ -12,7 +12,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::world::World;
+use crate::world::View;
 
 /// Frames that can be under way.
 const PLACES: usize = 64;
@@ -53,7 +53,7 @@ impl Sights {
     }
 
     /// What was seen before the start, when robot and ball were as they are now but for the ball's motion: for `time` (s).
-    pub(crate) fn look_back(&mut self, world: &World, time: f64, rng: &mut ChaCha8Rng) {
+    pub(crate) fn look_back(&mut self, world: &View<'_>, time: f64, rng: &mut ChaCha8Rng) {
         let now = world.time();
         let frames = (time / self.camera.period).ceil().max(1.0);
         self.next -= frames * self.camera.period;
@@ -64,7 +64,7 @@ impl Sights {
     }
 
     /// Takes a frame if it is time.
-    pub(crate) fn look(&mut self, world: &World, rng: &mut ChaCha8Rng) {
+    pub(crate) fn look(&mut self, world: &View<'_>, rng: &mut ChaCha8Rng) {
         if world.time() + GRACE >= self.next {
             self.frame(world, world.time(), rng);
         }
@@ -87,7 +87,7 @@ impl Sights {
         }
     }
 
-    fn frame(&mut self, world: &World, time: f64, rng: &mut ChaCha8Rng) {
+    fn frame(&mut self, world: &View<'_>, time: f64, rng: &mut ChaCha8Rng) {
         let camera = &self.camera;
         self.next += camera.period;
         let keep = if camera.correlation > 0.0 { (-camera.period / camera.correlation).exp() } else { 0.0 };
@@ -115,7 +115,7 @@ impl Sights {
     }
 
     /// The ball at `place` (m, world) as it is seen: in the base's heading frame, m.
-    fn sight(&self, world: &World, place: &Vector3<f64>) -> Option<[f64; 3]> {
+    fn sight(&self, world: &View<'_>, place: &Vector3<f64>) -> Option<[f64; 3]> {
         let eye = world.camera_pose(&self.camera);
         let seen = eye.inverse_transform_point(&(*place).into()).coords;
         if !self.camera.frames(&seen) || !world.sees(eye.translation.vector, *place, self.camera.at.link) {

@@ -11,14 +11,12 @@ use serde::Serialize;
 use crate::SimError;
 use crate::audit::{Audit, Evidence, Outcome, RERUN_FACTOR, hardest};
 use crate::impact::{Impact, ImpactWatch};
-use crate::sensors::{SensorSuite, orientation};
+use crate::sensors::SensorSuite;
 use crate::settings::WorldSettings;
 use crate::world::{BallState, JointPeak, Steps, World};
 
 /// Tilt of the base link beyond which the robot counts as fallen, rad.
 pub const FALLEN_TILT: f64 = 1.05;
-/// Height of the base link, as a share of its standing height, below which the robot counts as fallen.
-const FALLEN_HEIGHT: f64 = 0.5;
 /// Load (N) above which a contact point of the support foot is expected not to slip.
 const LOADED: f64 = 20.0;
 /// Speed beyond the limit that counts as a violation, as a share of the limit: what one step can overshoot.
@@ -375,13 +373,10 @@ impl FallWatch {
     }
 }
 
-/// Whether the robot lies: its body on the ground, the base lower than half its standing height or tilted beyond 60 degrees.
+/// Whether the robot lies: see [`crate::View::has_fallen`].
 #[must_use]
 pub fn has_fallen(world: &World) -> bool {
-    let up = orientation(world.q()) * Vector3::z();
-    let tilt = up.z.clamp(-1.0, 1.0).acos();
-    let lowest = FALLEN_HEIGHT * world.robot().stand[2];
-    world.q()[2] < lowest || tilt > FALLEN_TILT || world.body_touches_ground()
+    world.on(0).has_fallen()
 }
 
 impl Record {

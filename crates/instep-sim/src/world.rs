@@ -1,26 +1,31 @@
-//! Robot, pitch and ball in one MuJoCo model, stepped under the robot's real limits.
+//! Robots, pitch and ball in one MuJoCo model, stepped under the robots' real limits.
 //!
-//! All contacts are explicit pairs: soles and body with the ground, striking geoms with the ball, the ball with the
-//! ground, and the robot's own self-collision pairs; nothing else touches. Drives are computed here at every physics
+//! Contacts are explicit pairs: soles and body with the ground, striking geoms with the ball, the ball with ground and goals,
+//! and each robot's own self-collision pairs; robots meet each other and the posts by MuJoCo's bits. Nothing else touches.
+//! A world of one robot is asked directly; of several, robot by robot through [`World::on`]. Drives are computed here at every physics
 //! step from the command and the state, so that no controller can ask for more torque or speed than the motors have.
 //! Commands are taken once a tick, which is a whole number of far steps; while the ball is near a striking geom a far
 //! step is divided into near steps (facts/mujoco-from-rust.md, section 5).
 
+mod body;
+mod view;
+
 use std::sync::Arc;
 
+use instep_field::{Field, Pose, Side};
 use instep_robot::Robot;
-use instep_robot::control::{JointCommand, drive_torque, torque_range_over_step};
-use instep_robot::drive::{Drives, Measured};
+use instep_robot::control::JointCommand;
 use instep_robot::senses::Camera;
-use mujoco_rs::mujoco_c;
 use mujoco_rs::prelude::*;
-use nalgebra::{Isometry3, Matrix3, Rotation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Vector3};
 
 use crate::SimError;
 use crate::impact::ImpactWatch;
-use crate::model::{BALL, FLOOR, build, foot_links, solid_geoms};
+use crate::model::{BALL, FLOOR, MOST_ROBOTS, build};
 use crate::sensors::orientation;
-use crate::settings::{Fidelity, WorldSettings};
+use crate::settings::WorldSettings;
+use body::Body;
+pub use view::View;
 
 /// How deep the ball may be in something at the start, m: what its own weight presses it in, and a little more.
 const OVERLAP: f64 = 1e-3;
@@ -62,34 +67,45 @@ pub struct JointPeak {
     pub speed_time: f64,
 }
 
-/// Robot, pitch and ball.
+/// A robot that is to be put on a field.
+#[derive(Debug, Clone)]
+pub struct Entrant {
+    /// With its own model, drives and senses.
+    pub robot: Arc<Robot>,
+    /// Whose player it is.
+    pub team: Side,
+    /// Where it stands at the start: its base over the ground, in the watcher's frame.
+    pub pose: Pose,
+}
+
+/// Robots, pitch and ball.
 pub struct World {
-    robot: Arc<Robot>,
     settings: WorldSettings,
     data: MjData<Box<MjModel>>,
+    field: Option<Arc<Field>>,
+    bodies: Vec<Body>,
     ball_geom: usize,
     ball_body: usize,
+    /// Where the ball's numbers begin in the world's q and v.
+    ball_at: [usize; 2],
     floor_geom: usize,
-    /// Striking geoms as (geom, bounding radius).
-    strike: Vec<(usize, f64)>,
-    /// Geoms that the ball cannot be inside of: the robot's and the ground.
+    /// Geoms that the ball cannot be inside of: the robots', the ground and the goals.
     obstacles: Vec<usize>,
-    /// For each geom of the world: the contact point that it is, if any.
-    contact_of_geom: Vec<Option<usize>>,
-    /// For each geom of the world: whether it belongs to the robot's body above the feet.
-    is_body: Vec<bool>,
-    /// `None`: ideal ones.
-    drives: Option<Drives>,
-    /// Zeros of the encoders, which drives and sensors share, rad.
-    encoder_offsets: Vec<f64>,
-    peaks: Vec<JointPeak>,
+    geoms: Vec<GeomRole>,
     time: f64,
-    motor_work: f64,
-    /// Force on the base link's centre of mass, N.
-    push: Vector3<f64>,
-    push_work: f64,
     near: bool,
     steps: Option<Steps>,
+}
+
+/// What a geom of the world is.
+#[derive(Debug, Clone, Copy, Default)]
+struct GeomRole {
+    /// Whose it is.
+    robot: Option<usize>,
+    /// The contact point that it is.
+    contact: Option<usize>,
+    /// Whether it belongs to a robot's body above the feet.
+    above_feet: bool,
 }
 
 /// Every physics step of a trial, for a program of its own to do again: `tools/replay.py`.
@@ -104,9 +120,9 @@ pub struct Steps {
     pub width: usize,
 }
 
-/// A contact of the ball with the robot.
+/// A contact of the ball with a robot.
 pub(crate) struct Strike {
-    /// Body index of the link.
+    /// Body index of the link in the robot's own model.
     pub(crate) link: usize,
     /// Where, m.
     pub(crate) point: Vector3<f64>,
@@ -118,125 +134,166 @@ pub(crate) struct Strike {
 
 impl std::fmt::Debug for World {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("World").field("robot", &self.robot.name).field("time", &self.time).finish_non_exhaustive()
+        let robots: Vec<&str> = self.bodies.iter().map(|body| body.robot.name.as_str()).collect();
+        f.debug_struct("World").field("robots", &robots).field("time", &self.time).finish_non_exhaustive()
     }
 }
 
 impl World {
-    /// Builds a world around `robot`: the robot in its standing pose at the origin, the ball at rest 1 m ahead.
+    /// Builds a world around `robot`: the robot in its standing pose at the origin, the ball at rest 1 m ahead, no goals.
     ///
     /// # Errors
     /// When a setting cannot be, or MuJoCo refuses the world.
     pub fn new(robot: Arc<Robot>, settings: &WorldSettings) -> Result<Self, SimError> {
+        let entrant = Entrant { robot, team: Side::Home, pose: Pose::default() };
+        let mut world = Self::build(None, std::slice::from_ref(&entrant), settings)?;
+        world.start_again(&BallState::at_rest([1.0, 0.0, settings.ball.radius]))?;
+        Ok(world)
+    }
+
+    /// Builds a world with `field`'s goals and all of `entrants` in their standing poses, the ball at rest on the centre mark.
+    ///
+    /// # Errors
+    /// When there is no robot or there are too many, one stands outside the field and its border, two overlap or one stands in
+    /// a post, a setting cannot be, or MuJoCo refuses the world.
+    pub fn on_field(field: Arc<Field>, entrants: &[Entrant], settings: &WorldSettings) -> Result<Self, SimError> {
+        if !(1..=MOST_ROBOTS).contains(&entrants.len()) {
+            let found = format!("{} robots", entrants.len());
+            return Err(SimError::State { found, expected: format!("1 to {MOST_ROBOTS}") });
+        }
+        for (i, Entrant { robot, pose, .. }) in entrants.iter().enumerate() {
+            let finite = (pose.x + pose.y + pose.heading).is_finite();
+            if !finite || !field.contains([pose.x, pose.y], field.border) {
+                let [x, y] = [0.5 * field.length + field.border, 0.5 * field.width + field.border];
+                let found = format!("x {:.3}, y {:.3} m, heading {:.3} rad", pose.x, pose.y, pose.heading);
+                let expected = format!("within {x} m of the centre mark along the field and {y} m across");
+                return Err(SimError::Place { robot: i, name: robot.name.clone(), found, expected });
+            }
+        }
+        let mut world = Self::build(Some(field), entrants, settings)?;
+        world.start_again(&BallState::at_rest([0.0, 0.0, settings.ball.radius]))?;
+        match world.overlap() {
+            Some((robot, other, depth)) => {
+                let found = format!("{depth:.3} m inside {other}");
+                let name = entrants[robot].robot.name.clone();
+                Err(SimError::Place { robot, name, found, expected: "a place where it touches nothing".into() })
+            }
+            None => Ok(world),
+        }
+    }
+
+    fn build(field: Option<Arc<Field>>, entrants: &[Entrant], settings: &WorldSettings) -> Result<Self, SimError> {
         settings.validate()?;
-        let name = robot.name.clone();
-        let refused = |detail: String| SimError::World { robot: name.clone(), detail };
-        let mut spec = robot.spec()?;
-        build(&mut spec, &robot, settings).map_err(|e| refused(e.to_string()))?;
+        let robots: Vec<&Robot> = entrants.iter().map(|entrant| &*entrant.robot).collect();
+        let names = robots.iter().map(|robot| robot.name.as_str()).collect::<Vec<_>>().join(", ");
+        let refused = |detail: String| SimError::World { robot: names.clone(), detail };
+        let mut spec = build(&robots, field.as_deref(), settings)?;
         let model = spec.compile().map_err(|e| refused(e.to_string()))?;
 
         let geom = |name: &str| model.name_to_id(MjtObjBase::mjOBJ_GEOM, name);
         let (Some(ball_geom), Some(floor_geom)) = (geom(BALL), geom(FLOOR)) else {
             return Err(refused("ball or floor were lost in compilation".into()));
         };
-        let world_geom = |robot_geom: usize| {
-            robot
-                .model()
-                .id_to_name(MjtObjBase::mjOBJ_GEOM, robot_geom)
-                .and_then(geom)
-                .ok_or_else(|| refused(format!("geom {robot_geom} was lost in compilation")))
-        };
-        let mut strike = Vec::new();
-        for &robot_geom in robot.legs.iter().flat_map(|leg| &leg.strike) {
-            let id = world_geom(robot_geom)?;
-            strike.push((id, model.geom_rbound()[id]));
-        }
+        let mut geoms = vec![GeomRole::default(); model.geom_bodyid().len()];
         let mut obstacles = vec![floor_geom];
-        for robot_geom in solid_geoms(&robot) {
-            obstacles.push(world_geom(robot_geom)?);
+        let mut bodies: Vec<Body> = Vec::with_capacity(entrants.len());
+        let (mut q, mut v, mut link) = (0, 0, 0);
+        for (i, entrant) in entrants.iter().enumerate() {
+            let body = Body::new(i, entrant, [q, v, link], &model, settings, &mut geoms, &mut obstacles)
+                .map_err(&refused)?;
+            q += entrant.robot.nq();
+            v += entrant.robot.nv();
+            link += entrant.robot.model().body_parentid().len() - 1;
+            bodies.push(body);
         }
-        let ball_body = usize::try_from(model.geom_bodyid()[ball_geom]).unwrap_or(0);
-        let geoms = model.geom_bodyid().len();
-        let mut contact_of_geom = vec![None; geoms];
-        for (i, contact) in robot.contacts.iter().enumerate() {
-            contact_of_geom[world_geom(contact.geom)?] = Some(i);
+        if [q + 7, v + 6] != [model.ffi().nq, model.ffi().nv].map(|n| usize::try_from(n).unwrap_or(0)) {
+            return Err(refused("the world has other joints than the robots and the ball".into()));
         }
-        let feet = foot_links(&robot);
-        let bodies = robot.model().body_parentid().len();
-        let is_body = model
-            .geom_bodyid()
-            .iter()
-            .map(|&body| {
-                let body = usize::try_from(body).unwrap_or(0);
-                (1..bodies).contains(&body) && !feet.contains(&body)
-            })
-            .collect();
-        let joints = robot.joints.len();
-        let mut world = Self {
-            drives: (settings.drives == Fidelity::AsBuilt).then(|| Drives::new(&robot)),
-            encoder_offsets: vec![0.0; joints],
-            robot,
+        if field.is_some() {
+            let in_goal = |geom: &usize| {
+                model.geom_bodyid()[*geom] == 0 && *geom != floor_geom && model.geom_rgba()[*geom][3] > 0.0
+            };
+            obstacles.extend((0..geoms.len()).filter(in_goal));
+        }
+        Ok(Self {
             settings: *settings,
-            data: MjData::try_new(Box::new(model)).map_err(|e| refused(e.to_string()))?,
+            field,
+            bodies,
             ball_geom,
-            ball_body,
+            ball_body: usize::try_from(model.geom_bodyid()[ball_geom]).unwrap_or(0),
+            ball_at: [q, v],
+            data: MjData::try_new(Box::new(model)).map_err(|e| refused(e.to_string()))?,
             floor_geom,
-            strike,
             obstacles,
-            contact_of_geom,
-            is_body,
-            peaks: vec![JointPeak::default(); joints],
+            geoms,
             time: 0.0,
-            motor_work: 0.0,
-            push: Vector3::zeros(),
-            push_work: 0.0,
             near: false,
             steps: None,
-        };
-        let stand = world.robot.stand.clone();
-        let still = vec![0.0; world.robot.nv()];
-        world.reset(&stand, &still, &BallState::at_rest([1.0, 0.0, settings.ball.radius]))?;
-        Ok(world)
+        })
     }
 
-    /// Starts again from a state of the robot (q: 7 + n, v: 6 + n, see instep-robot) and of the ball.
+    /// Starts again from a state of the robot (q: 7 + n, v: 6 + n, see instep-robot) and of the ball; where there are several
+    /// robots, of the first one, with all others where they stood.
     ///
     /// # Errors
     /// When a vector has another length or holds something that is not finite.
     pub fn reset(&mut self, q: &[f64], v: &[f64], ball: &BallState) -> Result<(), SimError> {
-        let (nq, nv) = (self.robot.nq(), self.robot.nv());
-        let wrong = |found: String, expected: String| Err(SimError::State { found, expected });
-        if q.len() != nq || v.len() != nv {
-            let found = format!("{} positions and {} speeds", q.len(), v.len());
-            return wrong(found, format!("{nq} and {nv} for {}", self.robot.name));
-        }
-        let ball_numbers = ball.position.iter().chain(&ball.orientation).chain(&ball.velocity);
-        if let Some(bad) = q.iter().chain(v).chain(ball_numbers).find(|x| !x.is_finite()) {
-            return wrong(bad.to_string(), "finite numbers".into());
+        self.check_state(0, q, v)?;
+        let numbers = ball.position.iter().chain(&ball.orientation).chain(&ball.velocity);
+        if let Some(bad) = numbers.into_iter().find(|x| !x.is_finite()) {
+            return Err(SimError::State { found: bad.to_string(), expected: "finite numbers".into() });
         }
         self.data.reset();
-        let qpos = self.data.qpos_mut();
-        qpos[..nq].copy_from_slice(q);
-        qpos[nq..nq + 3].copy_from_slice(&ball.position);
-        qpos[nq + 3..nq + 7].copy_from_slice(&ball.orientation);
-        let qvel = self.data.qvel_mut();
-        qvel[..nv].copy_from_slice(v);
-        qvel[nv..nv + 3].copy_from_slice(&ball.velocity);
-        qvel[nv + 3..nv + 6].copy_from_slice(&ball.angular_velocity);
-        self.data.forward();
-        if let Some(drives) = &mut self.drives {
-            drives.reset();
+        for body in self.bodies.iter_mut().skip(1) {
+            let [at, _] = body.at;
+            self.data.qpos_mut()[at..at + body.start.len()].copy_from_slice(&body.start);
         }
-        self.peaks.fill(JointPeak::default());
+        self.data.qpos_mut()[..q.len()].copy_from_slice(q);
+        self.data.qvel_mut()[..v.len()].copy_from_slice(v);
+        self.place_ball(ball);
+        self.bodies.iter_mut().for_each(Body::reset);
         self.time = 0.0;
-        self.motor_work = 0.0;
-        self.push = Vector3::zeros();
-        self.push_work = 0.0;
         self.near = self.is_near();
         if let Some(steps) = &mut self.steps {
             *steps = Steps::default();
         }
         Ok(())
+    }
+
+    /// Starts again with every robot at rest where it stood at first.
+    ///
+    /// # Errors
+    /// When the ball's numbers are not finite.
+    pub fn start_again(&mut self, ball: &BallState) -> Result<(), SimError> {
+        let (q, v) = (self.bodies[0].start.clone(), vec![0.0; self.bodies[0].robot.nv()]);
+        self.reset(&q, &v, ball)
+    }
+
+    /// Puts robot `index` into a state (q: 7 + n, v: 6 + n), as hands would that carry it.
+    ///
+    /// # Errors
+    /// When a vector has another length or holds something that is not finite.
+    pub fn place_robot(&mut self, index: usize, q: &[f64], v: &[f64]) -> Result<(), SimError> {
+        self.check_state(index, q, v)?;
+        let [q_at, v_at] = self.bodies[index].at;
+        self.data.qpos_mut()[q_at..q_at + q.len()].copy_from_slice(q);
+        self.data.qvel_mut()[v_at..v_at + v.len()].copy_from_slice(v);
+        self.data.forward();
+        Ok(())
+    }
+
+    fn check_state(&self, index: usize, q: &[f64], v: &[f64]) -> Result<(), SimError> {
+        let robot = &self.bodies[index].robot;
+        let (nq, nv) = (robot.nq(), robot.nv());
+        let wrong = |found: String, expected: String| Err(SimError::State { found, expected });
+        if q.len() != nq || v.len() != nv {
+            let found = format!("{} positions and {} speeds", q.len(), v.len());
+            return wrong(found, format!("{nq} and {nv} for {}", robot.name));
+        }
+        match q.iter().chain(v).find(|x| !x.is_finite()) {
+            Some(bad) => wrong(bad.to_string(), "finite numbers".into()),
+            None => Ok(()),
+        }
     }
 
     /// Keeps every physics step from the next reset on, until they are taken.
@@ -255,19 +312,37 @@ impl World {
     ///
     /// # Errors
     /// When the command or the state is no longer finite.
-    pub fn advance(&mut self, command: &JointCommand, mut watch: Option<&mut ImpactWatch>) -> Result<(), SimError> {
+    pub fn advance(&mut self, command: &JointCommand, watch: Option<&mut ImpactWatch>) -> Result<(), SimError> {
+        self.advance_all(std::slice::from_ref(command), watch)
+    }
+
+    /// As [`World::advance`], with one command a robot.
+    ///
+    /// # Errors
+    /// Also when there are more or fewer commands than robots.
+    pub fn advance_all(
+        &mut self,
+        commands: &[JointCommand],
+        mut watch: Option<&mut ImpactWatch>,
+    ) -> Result<(), SimError> {
+        if commands.len() != self.bodies.len() {
+            let found = format!("{} commands", commands.len());
+            return Err(SimError::State { found, expected: format!("one for each of {} robots", self.bodies.len()) });
+        }
         let step = self.settings.step;
         for _ in 0..step.far_per_tick() {
             self.near = self.is_near();
-            if let Some(drives) = &mut self.drives {
-                drives.offer(self.time, command);
+            for (body, command) in self.bodies.iter_mut().zip(commands) {
+                if let Some(drives) = &mut body.drives {
+                    drives.offer(self.time, command);
+                }
             }
             let (count, dt) = if self.near { (step.near_per_far(), step.near) } else { (1, step.far) };
             for _ in 0..count {
                 if let Some(watch) = watch.as_deref_mut() {
                     watch.before(self);
                 }
-                self.step(command, dt)?;
+                self.step(commands, dt)?;
                 if let Some(watch) = watch.as_deref_mut() {
                     watch.after(self);
                 }
@@ -276,65 +351,36 @@ impl World {
         Ok(())
     }
 
-    /// Pushes the base link's centre of mass with `force` (N, world frame) from now on; zero ends the push.
+    /// Pushes the (first) robot's base link at its centre of mass with `force` (N, world frame) from now on; zero ends the push.
     pub fn push(&mut self, force: [f64; 3]) {
-        let base = self.robot.base;
-        self.data.xfrc_applied_mut()[base][..3].copy_from_slice(&force);
-        self.push = force.into();
+        self.push_robot(0, force);
+    }
+
+    /// Pushes robot `index` likewise.
+    pub fn push_robot(&mut self, index: usize, force: [f64; 3]) {
+        let body = &mut self.bodies[index];
+        self.data.xfrc_applied_mut()[body.base()][..3].copy_from_slice(&force);
+        body.push = force.into();
     }
 
     /// Puts the ball where `ball` says, as a hand or another player would.
     pub fn place_ball(&mut self, ball: &BallState) {
-        let (nq, nv) = (self.robot.nq(), self.robot.nv());
+        let [q, v] = self.ball_at;
         let qpos = self.data.qpos_mut();
-        qpos[nq..nq + 3].copy_from_slice(&ball.position);
-        qpos[nq + 3..nq + 7].copy_from_slice(&ball.orientation);
+        qpos[q..q + 3].copy_from_slice(&ball.position);
+        qpos[q + 3..q + 7].copy_from_slice(&ball.orientation);
         let qvel = self.data.qvel_mut();
-        qvel[nv..nv + 3].copy_from_slice(&ball.velocity);
-        qvel[nv + 3..nv + 6].copy_from_slice(&ball.angular_velocity);
+        qvel[v..v + 3].copy_from_slice(&ball.velocity);
+        qvel[v + 3..v + 6].copy_from_slice(&ball.angular_velocity);
         self.data.forward();
     }
 
     /// One physics step of `dt` (s).
-    fn step(&mut self, command: &JointCommand, dt: f64) -> Result<(), SimError> {
+    fn step(&mut self, commands: &[JointCommand], dt: f64) -> Result<(), SimError> {
         self.drag_ball();
-        let pushed = self.push != Vector3::zeros();
-        if pushed {
-            self.push_work += 0.5 * dt * self.push.dot(&self.base_com_velocity());
-        }
-        let joints = &self.robot.joints;
-        let (mut torque_sum, mut load) = (0.0, 0.0);
-        for (i, joint) in joints.iter().enumerate() {
-            let (q, v) = (self.data.qpos()[7 + i], self.data.qvel()[6 + i]);
-            // 1 / D of M = L^T D L: the joint's inertia with the links below it free and those above it held.
-            let inverse_inertia = self.data.q_ldiag_inv()[6 + i];
-            let torque = match &mut self.drives {
-                Some(drives) => {
-                    let position = q + self.encoder_offsets[i];
-                    let now = Measured { position, velocity: v, voltage: 1.0, step: dt, inverse_inertia };
-                    drives.torque(i, joint, now)
-                }
-                None => {
-                    let target = (command.positions[i], command.velocities[i], command.torques[i]);
-                    let wanted = drive_torque(joint, target.0, target.1, target.2, q, v);
-                    let [least, greatest] = torque_range_over_step(joint, v, dt * inverse_inertia, 1.0);
-                    wanted.clamp(least, greatest)
-                }
-            };
-            load += torque.abs();
-            torque_sum += torque;
-            self.motor_work += 0.5 * dt * torque * v;
-            self.data.qfrc_applied_mut()[6 + i] = torque;
-            let peak = &mut self.peaks[i];
-            if torque.abs() > peak.torque {
-                (peak.torque, peak.torque_time) = (torque.abs(), self.time);
-            }
-            if v.abs() > peak.speed {
-                (peak.speed, peak.speed_time) = (v.abs(), self.time);
-            }
-        }
-        if let Some(drives) = &mut self.drives {
-            drives.loaded(load);
+        let mut torque_sum = 0.0;
+        for (body, command) in self.bodies.iter_mut().zip(commands) {
+            torque_sum += body.drive(&mut self.data, command, self.time, dt);
         }
         if !torque_sum.is_finite() {
             return Err(SimError::Diverged { time: self.time, what: "a joint torque" });
@@ -345,7 +391,7 @@ impl World {
             for part in [self.data.qpos(), self.data.qvel(), self.data.qfrc_applied()] {
                 steps.rows.extend_from_slice(part);
             }
-            for body in [self.robot.base, self.ball_body] {
+            for body in self.bodies.iter().map(Body::base).chain([self.ball_body]) {
                 steps.rows.extend_from_slice(&self.data.xfrc_applied()[body]);
             }
             steps.width = steps.rows.len() - before;
@@ -354,17 +400,11 @@ impl World {
         self.data.model_opt_mut().timestep = dt;
         self.data.step();
         self.time += dt;
-        // Work by the mean of the speeds before and after the step.
-        let mut speed_sum = 0.0;
-        for i in 6..6 + joints.len() {
-            let v = self.data.qvel()[i];
-            speed_sum += v;
-            self.motor_work += 0.5 * dt * self.data.qfrc_applied()[i] * v;
+        let mut state_sum = 0.0;
+        for body in &mut self.bodies {
+            state_sum += body.account(&self.data, dt);
         }
-        if pushed {
-            self.push_work += 0.5 * dt * self.push.dot(&self.base_com_velocity());
-        }
-        if !(speed_sum + self.data.qpos()[2]).is_finite() {
+        if !state_sum.is_finite() {
             return Err(SimError::Diverged { time: self.time, what: "a joint speed" });
         }
         Ok(())
@@ -377,14 +417,6 @@ impl World {
         self.data.xfrc_applied_mut()[self.ball_body][..3].copy_from_slice(&velocity.map(|v| -damping * v));
     }
 
-    /// Velocity of the base link's centre of mass, m/s.
-    fn base_com_velocity(&self) -> Vector3<f64> {
-        let v = self.v();
-        let centre = Vector3::from(self.data.model().body_ipos()[self.robot.base]);
-        let spin = orientation(self.q()) * Vector3::new(v[3], v[4], v[5]).cross(&centre);
-        Vector3::new(v[0], v[1], v[2]) + spin
-    }
-
     /// Whether the gap between the ball and a striking geom is under the near distance and what they approach each other
     /// in [`NEAR_STEPS`] far steps.
     fn is_near(&mut self) -> bool {
@@ -392,21 +424,41 @@ impl World {
         let ball = Vector3::from(self.data.geom_xpos()[self.ball_geom]);
         let ball_velocity = Vector3::from(self.ball().velocity);
         let radius = self.settings.ball.radius;
-        (0..self.strike.len()).any(|i| {
-            let (geom, bound) = self.strike[i];
-            let [wx, wy, wz, vx, vy, vz] = self.data.object_velocity(MjtObjBase::mjOBJ_GEOM, geom, false);
+        let data = &mut self.data;
+        self.bodies.iter().flat_map(|body| &body.strike).any(|&(geom, bound)| {
+            let [wx, wy, wz, vx, vy, vz] = data.object_velocity(MjtObjBase::mjOBJ_GEOM, geom, false);
             let speed = (Vector3::new(vx, vy, vz) - ball_velocity).norm() + Vector3::new(wx, wy, wz).norm() * bound;
             let reach = step.near_distance + NEAR_STEPS * step.far * speed;
-            let centre = Vector3::from(self.data.geom_xpos()[geom]);
+            let centre = Vector3::from(data.geom_xpos()[geom]);
             (ball - centre).norm() < reach + radius + bound
-                && self.data.geom_distance(geom, self.ball_geom, 2.0 * reach, None) < reach
+                && data.geom_distance(geom, self.ball_geom, 2.0 * reach, None) < reach
         })
+    }
+
+    /// What robot `index` is and does. The calls of a single robot below are those of the first.
+    ///
+    /// # Panics
+    /// When there is no such robot.
+    #[must_use]
+    pub fn on(&self, index: usize) -> View<'_> {
+        View::new(self, &self.bodies[index])
+    }
+
+    /// All robots, in the order in which they entered.
+    pub fn robots(&self) -> impl ExactSizeIterator<Item = View<'_>> {
+        self.bodies.iter().map(|body| View::new(self, body))
+    }
+
+    /// The field whose goals stand here, where there is one.
+    #[must_use]
+    pub fn field(&self) -> Option<&Arc<Field>> {
+        self.field.as_ref()
     }
 
     /// The robot.
     #[must_use]
     pub fn robot(&self) -> &Arc<Robot> {
-        &self.robot
+        self.on(0).robot()
     }
 
     /// The constants.
@@ -421,23 +473,22 @@ impl World {
         self.time
     }
 
-    /// Work that the motors have done since the last reset, J.
+    /// Work that all motors have done since the last reset, J.
     #[must_use]
     pub fn motor_work(&self) -> f64 {
-        self.motor_work
+        self.bodies.iter().map(|body| body.motor_work).sum()
     }
 
     /// Work that pushes have done since the last reset, J.
     #[must_use]
     pub fn push_work(&self) -> f64 {
-        self.push_work
+        self.bodies.iter().map(|body| body.push_work).sum()
     }
 
     /// Kinetic and potential energy (J) of robot and ball in a state, which becomes the world's.
     pub(crate) fn energy(&mut self, q: &[f64], v: &[f64], ball: &BallState) -> [f64; 2] {
-        let (nq, nv) = (self.robot.nq(), self.robot.nv());
-        self.data.qpos_mut()[..nq].copy_from_slice(q);
-        self.data.qvel_mut()[..nv].copy_from_slice(v);
+        self.data.qpos_mut()[..q.len()].copy_from_slice(q);
+        self.data.qvel_mut()[..v.len()].copy_from_slice(v);
         self.place_ball(ball);
         self.data.energy_pos();
         self.data.energy_vel();
@@ -451,34 +502,58 @@ impl World {
         let data = &mut self.data;
         let deepest = self.obstacles.iter().map(|&geom| (geom, -data.geom_distance(geom, ball, radius, None)));
         let (geom, depth) = deepest.max_by(|a, b| a.1.total_cmp(&b.1))?;
-        let body = usize::try_from(self.data.model().geom_bodyid()[geom]).unwrap_or(0);
-        let name = if body == 0 { "the ground" } else { self.robot.link_name(body) };
+        let name = match self.geoms[geom].robot {
+            Some(robot) => self.bodies[robot].link_name(&self.data, geom),
+            None if geom == self.floor_geom => "the ground",
+            None => "a goal",
+        };
         (depth > OVERLAP).then(|| (name.to_owned(), depth))
+    }
+
+    /// A robot that is inside of another or of a post, what it is inside of, and how deep (m), as of the last forward step.
+    fn overlap(&self) -> Option<(usize, String, f64)> {
+        let mut deepest: Option<(usize, String, f64)> = None;
+        for contact in self.data.contact() {
+            let [a, b] = contact.geom.map(|geom| usize::try_from(geom).ok().map(|g| (g, self.geoms[g].robot)));
+            let (Some(a), Some(b)) = (a, b) else { continue };
+            let apart = [a, b].iter().any(|(geom, _)| *geom == self.floor_geom || *geom == self.ball_geom);
+            // The later of two stands in the earlier one's way.
+            let (Some(robot), other) = (a.1.max(b.1), a.1.min(b.1)) else { continue };
+            let depth = -contact.dist;
+            if apart || other == Some(robot) || depth <= OVERLAP || deepest.as_ref().is_some_and(|d| d.2 >= depth) {
+                continue;
+            }
+            let name = match other {
+                Some(other) => format!("robot {other} ({})", self.bodies[other].robot.name),
+                None => "a goal post".to_owned(),
+            };
+            deepest = Some((robot, name, depth));
+        }
+        deepest
     }
 
     /// The robot's position, 7 + n.
     #[must_use]
     pub fn q(&self) -> &[f64] {
-        &self.data.qpos()[..self.robot.nq()]
+        self.on(0).q()
     }
 
     /// The robot's speed, 6 + n.
     #[must_use]
     pub fn v(&self) -> &[f64] {
-        &self.data.qvel()[..self.robot.nv()]
+        self.on(0).v()
     }
 
     /// The torques of the last step, N m.
     #[must_use]
     pub fn torques(&self) -> &[f64] {
-        &self.data.qfrc_applied()[6..self.robot.nv()]
+        self.on(0).torques()
     }
 
     /// The ball.
     #[must_use]
     pub fn ball(&self) -> BallState {
-        let q = &self.data.qpos()[self.robot.nq()..];
-        let v = &self.data.qvel()[self.robot.nv()..];
+        let (q, v) = (&self.data.qpos()[self.ball_at[0]..], &self.data.qvel()[self.ball_at[1]..]);
         BallState {
             position: [q[0], q[1], q[2]],
             orientation: [q[3], q[4], q[5], q[6]],
@@ -490,7 +565,7 @@ impl World {
     /// Each joint's peaks since the last reset.
     #[must_use]
     pub fn peaks(&self) -> &[JointPeak] {
-        &self.peaks
+        self.on(0).peaks()
     }
 
     /// Whether the last step was a near one.
@@ -501,99 +576,64 @@ impl World {
 
     /// Force of the ground on each contact point in the world, N, as of the last step; `forces` has one entry a point.
     pub fn contact_forces_into(&self, forces: &mut [Vector3<f64>]) {
-        forces.fill(Vector3::zeros());
-        for (i, contact) in self.data.contact().iter().enumerate() {
-            let [a, b] = contact.geom.map(|geom| usize::try_from(geom).unwrap_or(usize::MAX));
-            let (point, sign) = match (a == self.floor_geom, b == self.floor_geom) {
-                (true, false) => (b, 1.0),
-                (false, true) => (a, -1.0),
-                _ => continue,
-            };
-            if let Some(index) = self.contact_of_geom.get(point).copied().flatten() {
-                forces[index] += contact_force(&self.data, i) * sign;
-            }
-        }
+        self.on(0).contact_forces_into(forces);
     }
 
     /// Whether a part of the robot other than its feet touches the ground.
     #[must_use]
     pub fn body_touches_ground(&self) -> bool {
-        self.data.contact().iter().any(|contact| {
-            let [a, b] = contact.geom.map(|geom| usize::try_from(geom).unwrap_or(usize::MAX));
-            let other = if a == self.floor_geom {
-                b
-            } else if b == self.floor_geom {
-                a
-            } else {
-                return false;
-            };
-            contact.dist < 0.0 && self.is_body.get(other).copied().unwrap_or(false)
-        })
-    }
-
-    /// Origin of a link (m) and `world_from_link`, as of the start of the last step.
-    pub(crate) fn link_pose(&self, link: usize) -> (Vector3<f64>, Matrix3<f64>) {
-        (self.data.xpos()[link].into(), Matrix3::from_row_slice(&self.data.xmat()[link]))
+        self.on(0).body_touches_ground()
     }
 
     /// `world_from_camera` of the robot's `camera`, m, as of the start of the last step.
     #[must_use]
     pub fn camera_pose(&self, camera: &Camera) -> Isometry3<f64> {
-        let (origin, rotation) = self.link_pose(camera.at.link);
-        let turn = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation));
-        Isometry3::from_parts((origin + rotation * camera.at.point).into(), turn * camera.link_from_camera)
+        self.on(0).camera_pose(camera)
     }
 
     /// `world_from_heading`: the base link's ground projection and its heading.
     #[must_use]
     pub fn heading(&self) -> Isometry3<f64> {
-        let q = self.q();
-        let yaw = orientation(q).euler_angles().2;
-        Isometry3::new(Vector3::new(q[0], q[1], 0.0), Vector3::z() * yaw)
+        self.on(0).heading()
     }
 
-    /// Whether nothing but the link `but` stands between `from` and the ball at `to` (m).
-    pub(crate) fn sees(&self, from: Vector3<f64>, to: Vector3<f64>, but: usize) -> bool {
-        let way = to - from;
-        let distance = way.norm();
-        let (from, way) = ([from.x, from.y, from.z], [way.x / distance, way.y / distance, way.z / distance]);
-        let mut geom = -1;
-        // SAFETY: model and data belong together, the vectors have three numbers, no groups and no normal are asked for.
-        let hit = unsafe {
-            mujoco_c::mj_ray(
-                self.data.model().ffi(),
-                self.data.ffi(),
-                &raw const from,
-                &raw const way,
-                std::ptr::null(),
-                true,
-                i32::try_from(but).unwrap_or(-1),
-                &raw mut geom,
-                std::ptr::null_mut(),
-            )
-        };
-        usize::try_from(geom).is_ok_and(|geom| geom == self.ball_geom)
-            || !(0.0..distance - self.settings.ball.radius).contains(&hit)
+    /// Fits robot `index` with other encoders, whose zeros (rad) are off by `offsets`.
+    pub(crate) fn set_encoder_offsets(&mut self, index: usize, offsets: &[f64]) {
+        self.bodies[index].encoder_offsets.copy_from_slice(offsets);
     }
 
-    /// Fits other encoders, whose zeros (rad) are off by `offsets`.
-    pub(crate) fn set_encoder_offsets(&mut self, offsets: &[f64]) {
-        self.encoder_offsets.copy_from_slice(offsets);
+    /// Robots that touched the ball in the last step; one that did so twice may come twice.
+    pub fn robots_on_ball(&self) -> impl Iterator<Item = usize> {
+        self.ball_contacts().map(|(robot, ..)| robot)
     }
 
-    /// Every contact of the ball with the robot in the last step.
-    pub(crate) fn ball_strikes(&self) -> impl Iterator<Item = Strike> {
+    /// Pairs of robots that touched each other in the last step; a pair may come more than once.
+    pub fn robots_touching(&self) -> impl Iterator<Item = [usize; 2]> {
+        self.data.contact().iter().filter(|contact| contact.dist < 0.0).filter_map(|contact| {
+            let [a, b] = contact.geom.map(|geom| usize::try_from(geom).ok().and_then(|geom| self.geoms[geom].robot));
+            let (a, b) = (a?, b?);
+            (a != b).then_some([a.min(b), a.max(b)])
+        })
+    }
+
+    /// Contacts of the ball with robots in the last step: robot, its geom, index of the contact, sign of its force on the ball.
+    fn ball_contacts(&self) -> impl Iterator<Item = (usize, usize, usize, f64)> {
         self.data.contact().iter().enumerate().filter_map(|(i, contact)| {
             let [a, b] = contact.geom.map(|geom| usize::try_from(geom).unwrap_or(usize::MAX));
-            if a == self.floor_geom || b == self.floor_geom {
-                return None;
-            }
             let (striker, sign) = match (a == self.ball_geom, b == self.ball_geom) {
                 (false, true) => (a, 1.0),
                 (true, false) => (b, -1.0),
                 _ => return None,
             };
-            let link = usize::try_from(self.data.model().geom_bodyid()[striker]).ok()?;
+            Some((self.geoms.get(striker)?.robot?, striker, i, sign))
+        })
+    }
+
+    /// Every contact of the ball with the (first) robot in the last step.
+    pub(crate) fn ball_strikes(&self) -> impl Iterator<Item = Strike> {
+        self.ball_contacts().filter(|(robot, ..)| *robot == 0).filter_map(|(_, geom, i, sign)| {
+            let contact = &self.data.contact()[i];
+            let link = usize::try_from(self.data.model().geom_bodyid()[geom]).ok()?;
             let force = contact_force(&self.data, i) * sign;
             Some(Strike { link, point: contact.pos.into(), force, depth: -contact.dist })
         })

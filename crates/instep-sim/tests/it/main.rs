@@ -13,6 +13,7 @@ mod rig;
 mod ball;
 mod determinism;
 mod limits;
+mod many;
 mod senses;
 mod sensors;
 mod trial;
