@@ -82,6 +82,15 @@ fn normal(rng: &mut ChaCha8Rng) -> f64 {
     StandardNormal.sample(rng)
 }
 
+/// Where a camera looks.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Gaze {
+    /// From straight ahead to the left, rad.
+    pub yaw: f64,
+    /// Width of its field of view, rad.
+    pub width: f64,
+}
+
 /// A camera as a scenario says, with its errors and how they go on from frame to frame: for streams, and for whoever
 /// walks a robot and wants to know what it would see.
 #[derive(Debug, Clone)]
@@ -108,11 +117,17 @@ impl<'a> Camera<'a> {
         Self { scenario, noise: Noise::default(), rng, lasting, scale, ghosts: Vec::new(), time: 0.0 }
     }
 
-    /// What a robot at `pose` sees at `time`, which never runs backwards.
+    /// What a robot at `pose` sees at `time`, which never runs backwards, with a head that swings to and fro.
     pub fn look(&mut self, map: &Map, time: f64, pose: &Pose) -> Frame {
+        let yaw = PAN * (std::f64::consts::TAU * time / PAN_PERIOD).sin();
+        self.look_to(map, time, pose, Gaze { yaw, width: VIEW })
+    }
+
+    /// As [`Camera::look`], with the head where `gaze` says.
+    pub fn look_to(&mut self, map: &Map, time: f64, pose: &Pose, gaze: Gaze) -> Frame {
         self.advance(time - self.time);
         self.time = time;
-        self.frame(map, time, pose)
+        self.frame(map, time, pose, gaze)
     }
 
     fn advance(&mut self, dt: f64) {
@@ -141,11 +156,11 @@ impl<'a> Camera<'a> {
         [range * c, range * s]
     }
 
-    /// Whether a point of the robot's frame is in view when the head looks to `pan`.
-    fn in_view(point: [f64; 2], pan: f64) -> bool {
+    /// Whether a point of the robot's frame is in view.
+    fn in_view(point: [f64; 2], gaze: Gaze) -> bool {
         let range = point[0].hypot(point[1]);
-        let off = instep_field::wrap(point[1].atan2(point[0]) - pan);
-        (RANGE[0]..=RANGE[1]).contains(&range) && off.abs() <= VIEW / 2.0
+        let off = instep_field::wrap(point[1].atan2(point[0]) - gaze.yaw);
+        (RANGE[0]..=RANGE[1]).contains(&range) && off.abs() <= gaze.width / 2.0
     }
 
     fn any_class(&mut self) -> LandmarkClass {
@@ -154,8 +169,7 @@ impl<'a> Camera<'a> {
         classes[self.rng.random_range(0..classes.len())]
     }
 
-    fn frame(&mut self, map: &Map, time: f64, pose: &Pose) -> Frame {
-        let pan = PAN * (std::f64::consts::TAU * time / PAN_PERIOD).sin();
+    fn frame(&mut self, map: &Map, time: f64, pose: &Pose, gaze: Gaze) -> Frame {
         let mut landmarks: Vec<(f64, Sight)> = Vec::new();
         let add = |list: &mut Vec<(f64, Sight)>, class, position: [f64; 2]| {
             let sight = Sight { class, position, confidence: 1.0, covariance: None };
@@ -163,7 +177,7 @@ impl<'a> Camera<'a> {
         };
         for (k, &(class, at)) in map.landmarks().iter().enumerate() {
             let point = pose.local_from_outer(at);
-            if !Self::in_view(point, pan) || self.rng.random::<f64>() < self.scenario.missed {
+            if !Self::in_view(point, gaze) || self.rng.random::<f64>() < self.scenario.missed {
                 continue;
             }
             let class = if self.rng.random::<f64>() < self.scenario.confused { self.any_class() } else { class };
@@ -179,7 +193,7 @@ impl<'a> Camera<'a> {
             // Even over the area in view.
             let [near, far] = RANGE.map(|r| r * r);
             *distance = (near + (far - near) * self.rng.random::<f64>()).sqrt();
-            let bearing = pan + VIEW * (self.rng.random::<f64>() - 0.5);
+            let bearing = gaze.yaw + gaze.width * (self.rng.random::<f64>() - 0.5);
             sight.position = [*distance * bearing.cos(), *distance * bearing.sin()];
             sight.class = self.any_class();
             if self.rng.random::<f64>() < self.scenario.ghost_share {
@@ -190,19 +204,19 @@ impl<'a> Camera<'a> {
         for k in 0..self.ghosts.len() {
             let (_, class, at) = self.ghosts[k];
             let point = pose.local_from_outer(at);
-            if Self::in_view(point, pan) {
+            if Self::in_view(point, gaze) {
                 let position = self.seen(point, None);
                 add(&mut landmarks, class, position);
             }
         }
         landmarks.sort_by(|a, b| a.0.total_cmp(&b.0));
         landmarks.truncate(self.scenario.most);
-        let lines = if self.scenario.lines { self.lines(map, pose, pan) } else { Vec::new() };
+        let lines = if self.scenario.lines { self.lines(map, pose, gaze) } else { Vec::new() };
         Frame { time, landmarks: landmarks.into_iter().map(|l| l.1).collect(), lines }
     }
 
     /// The longest piece in view of each line, no longer than [`PIECE`]; a fifth is missed.
-    fn lines(&mut self, map: &Map, pose: &Pose, pan: f64) -> Vec<LineSight> {
+    fn lines(&mut self, map: &Map, pose: &Pose, gaze: Gaze) -> Vec<LineSight> {
         let mut sights = Vec::new();
         let landmarks = map.landmarks().len();
         for (k, line) in map.lines().iter().enumerate() {
@@ -210,7 +224,7 @@ impl<'a> Camera<'a> {
             let (mut run, mut best) = (0_usize, (0_usize, 0_usize));
             for i in 0..=steps as usize {
                 let point = pose.local_from_outer(line.point(i as f64 / steps));
-                run = if Self::in_view(point, pan) && point[0].hypot(point[1]) < 6.0 { run + 1 } else { 0 };
+                run = if Self::in_view(point, gaze) && point[0].hypot(point[1]) < 6.0 { run + 1 } else { 0 };
                 if run > best.1 {
                     best = (i + 1 - run, run);
                 }

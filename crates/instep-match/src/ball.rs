@@ -85,7 +85,7 @@ impl Ball {
     }
 
     /// The whole ball must be over a line.
-    fn whereabouts(&self, field: &Field) -> Whereabouts {
+    pub(crate) fn whereabouts(&self, field: &Field) -> Whereabouts {
         let [x, y] = self.position;
         let r = field.ball.radius;
         if x.abs() > field.length / 2.0 + r {

@@ -2,6 +2,9 @@
 
 use instep_behaviour::BehaviourError;
 use instep_field::FieldError;
+use instep_localisation::LocalisationError;
+use instep_player::PlayerError;
+use instep_sim::SimError;
 
 /// A match that cannot be played.
 #[derive(Debug, thiserror::Error)]
@@ -12,6 +15,15 @@ pub enum MatchError {
     /// A strategy or a table of kicks.
     #[error(transparent)]
     Behaviour(#[from] BehaviourError),
+    /// A player that cannot be made.
+    #[error(transparent)]
+    Player(#[from] PlayerError),
+    /// A field that nobody can localise on.
+    #[error(transparent)]
+    Localisation(#[from] LocalisationError),
+    /// The physics.
+    #[error(transparent)]
+    World(#[from] SimError),
     /// A number that cannot be.
     #[error("{what}: {found}; expected {expected}")]
     Value {

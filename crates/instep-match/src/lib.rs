@@ -12,6 +12,7 @@ mod book;
 mod error;
 mod game;
 pub mod gamecontroller;
+pub mod physics;
 mod record;
 mod referee;
 mod robot;

@@ -61,7 +61,7 @@ pub struct RobotFrame {
     pub reasons: Vec<(&'static str, f32, bool, &'static str)>,
 }
 
-fn round(value: f64) -> f32 {
+pub(crate) fn round(value: f64) -> f32 {
     ((value * 1000.0).round() / 1000.0) as f32
 }
 

@@ -41,33 +41,38 @@ pub(crate) fn take(
     rng: &mut ChaCha8Rng,
     sight: &mut Sight,
 ) {
-    let mut look = |point: Point| -> Option<(Point, f64)> {
-        let (dx, dy) = (point[0] - eye.x, point[1] - eye.y);
-        let d = dx.hypot(dy);
-        let angle = wrap(dy.atan2(dx) - eye.heading);
-        if d > settings.view.range
-            || wrap(angle - yaw).abs() > settings.view.half_angle
-            || chance(rng) < settings.misses
-        {
-            return None;
-        }
-        let measured = d * (1.0 + settings.range_noise * normal(rng));
-        let angle = angle + settings.angle_noise * normal(rng);
-        let std = (settings.range_noise * d).max(settings.angle_noise * d).max(0.01);
-        Some(([measured * angle.cos(), measured * angle.sin()], std))
-    };
     sight.ball = None;
     sight.opponents.clear();
     let covered = others.iter().any(|o| shadowed([eye.x, eye.y], ball, &o.circle));
     if !covered {
-        sight.ball = look(ball).map(|(position, std)| BallSight { position, std });
+        sight.ball = look(eye, yaw, ball, settings, rng).map(|(position, std)| BallSight { position, std });
     }
     for other in others.iter().filter(|o| o.opponent) {
-        if let Some((position, _)) = look(other.circle.center) {
+        if let Some((position, _)) = look(eye, yaw, other.circle.center, settings, rng) {
             // As many as a team has fit.
             let _ = sight.opponents.try_push(position);
         }
     }
+}
+
+/// Where a point seems to be in the robot frame, if it is found, and its standard deviation, m.
+pub(crate) fn look(
+    eye: &Pose,
+    yaw: f64,
+    point: Point,
+    settings: &SightSettings,
+    rng: &mut ChaCha8Rng,
+) -> Option<(Point, f64)> {
+    let (dx, dy) = (point[0] - eye.x, point[1] - eye.y);
+    let d = dx.hypot(dy);
+    let angle = wrap(dy.atan2(dx) - eye.heading);
+    if d > settings.view.range || wrap(angle - yaw).abs() > settings.view.half_angle || chance(rng) < settings.misses {
+        return None;
+    }
+    let measured = d * (1.0 + settings.range_noise * normal(rng));
+    let angle = angle + settings.angle_noise * normal(rng);
+    let std = (settings.range_noise * d).max(settings.angle_noise * d).max(0.01);
+    Some(([measured * angle.cos(), measured * angle.sin()], std))
 }
 
 /// Whether a robot's legs hide the ball: narrower than its shoulders.

@@ -62,9 +62,7 @@ pub(crate) fn build(robots: &[&Robot], field: Option<&Field>, settings: &WorldSe
     for (i, robot) in others.iter().enumerate() {
         let mut other = robot.spec()?;
         bodies.push(prepare(&mut other, robot, settings).map_err(|e| refused(robot, e))?);
-        spec.world_body_mut()
-            .attach_by_deep_copy(&mut other, &part(i + 1, ""), "")
-            .map_err(|e| refused(robot, e))?;
+        spec.world_body_mut().attach_by_deep_copy(&mut other, &part(i + 1, ""), "").map_err(|e| refused(robot, e))?;
     }
     furnish(&mut spec, robots, &bodies, field, settings).map_err(|e| refused(first, e))?;
     Ok(spec)
@@ -183,9 +181,8 @@ fn furnish(
         }
     }
     for part in &goals {
-        let grip = part.law.friction;
-        let friction = [grip, grip, 0.0, 0.0, 0.0];
-        add_pair(spec, &part.name, BALL, 3, friction, solref(&part.law), Some(SOLIMP));
+        let friction = [part.friction, part.friction, 0.0, 0.0, 0.0];
+        add_pair(spec, &part.name, BALL, 3, friction, part.solref, Some(SOLIMP));
     }
     // Rolling of a thin shell: (m + I / r^2) a = N c / r with I = 2/3 m r^2, so c = 5/3 r a / g.
     let roll = 5.0 / 3.0 * settings.ball.radius * settings.ball.rolling_deceleration / 9.81;

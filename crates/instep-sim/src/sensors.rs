@@ -207,7 +207,8 @@ impl SensorSuite {
         now.accelerometer = [0, 1, 2].map(|k| specific[k] + faults.accelerometer[k] + draw(noise.accelerometer));
         let error = UnitQuaternion::from_scaled_axis(Vector3::from([0, 1, 2].map(|_| draw(noise.orientation))));
         let drift = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), faults.yaw_rate * world.time());
-        let estimate = drift * from_start(world) * world_from_base * UnitQuaternion::from_scaled_axis(faults.tilt) * error;
+        let estimate =
+            drift * from_start(world) * world_from_base * UnitQuaternion::from_scaled_axis(faults.tilt) * error;
         now.orientation = [estimate.w, estimate.i, estimate.j, estimate.k];
 
         world.contact_forces_into(&mut self.forces);

@@ -199,8 +199,8 @@ impl World {
         let mut bodies: Vec<Body> = Vec::with_capacity(entrants.len());
         let (mut q, mut v, mut link) = (0, 0, 0);
         for (i, entrant) in entrants.iter().enumerate() {
-            let body = Body::new(i, entrant, [q, v, link], &model, settings, &mut geoms, &mut obstacles)
-                .map_err(&refused)?;
+            let body =
+                Body::new(i, entrant, [q, v, link], &model, settings, &mut geoms, &mut obstacles).map_err(&refused)?;
             q += entrant.robot.nq();
             v += entrant.robot.nv();
             link += entrant.robot.model().body_parentid().len() - 1;

@@ -1,6 +1,9 @@
-//! `instep match`: games in the game simulator; how two strategies compare, and one game to look at.
+//! `instep match`: games in the game simulator; how two strategies compare, and one game to look at. With `--physics` a game, or
+//! a scene, of whole players in MuJoCo.
 
 mod page;
+mod physics;
+mod space;
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -24,11 +27,11 @@ pub(crate) struct Match {
     /// The league's rules and field: adult-2024, kid, hsl-s, hsl-m, hsl-l, simulation, fifa, or a field's TOML file
     #[arg(long, value_name = "RULES", default_value = "adult-2024")]
     rules: String,
-    /// Red's strategy [default: Instep's own]
-    #[arg(long, value_name = "FILE")]
+    /// Red's strategy, a file [default: Instep's own]; with --physics how many play [default: 2]
+    #[arg(long, value_name = "FILE|N")]
     red: Option<PathBuf>,
-    /// Blue's strategy [default: Instep's own]
-    #[arg(long, value_name = "FILE")]
+    /// Blue's likewise
+    #[arg(long, value_name = "FILE|N")]
     blue: Option<PathBuf>,
     /// How many games
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
@@ -57,6 +60,8 @@ pub(crate) struct Match {
     /// The same as out/match/replay.html, opened in the browser
     #[arg(long, conflicts_with = "save")]
     watch: bool,
+    #[command(flatten)]
+    in_physics: physics::InPhysics,
 }
 
 /// Seconds of a clock that only differences are taken of.
@@ -71,6 +76,9 @@ impl Match {
     /// # Errors
     /// When a file cannot be used or written.
     pub(crate) fn run(&self, output: &Output) -> Result<ExitCode, Failure> {
+        if self.in_physics.physics {
+            return physics::run(self, output);
+        }
         let mut settings = MatchSettings::new(&self.rules, self.players)?;
         settings.knockout = self.knockout;
         let small = matches!(settings.field.name.as_str(), "kid" | "hsl-s");

@@ -72,7 +72,8 @@ fn a_robot_among_others_moves_as_it_does_alone() {
         assert!(moved > 1e-3, "{name} has moved by {moved} rad");
         let apart = together.on(i).q().iter().zip(alone.q()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         assert!(apart < 1e-8, "{name} is {apart} from where it would be alone");
-        let torque = together.on(i).torques().iter().zip(alone.torques()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        let torque =
+            together.on(i).torques().iter().zip(alone.torques()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         assert!(torque < 1e-4, "{name}: {torque} N m");
     }
 }
@@ -81,7 +82,8 @@ fn a_robot_among_others_moves_as_it_does_alone() {
 #[test]
 fn a_robots_senses_are_its_own() {
     let mut together = mixed();
-    let mut suites: Vec<SensorSuite> = (0..MIXED.len()).map(|i| SensorSuite::of(&mut together, i, 10 + i as u64)).collect();
+    let mut suites: Vec<SensorSuite> =
+        (0..MIXED.len()).map(|i| SensorSuite::of(&mut together, i, 10 + i as u64)).collect();
     suites.iter_mut().for_each(|suite| suite.sense(&together));
     for (i, name) in MIXED.iter().enumerate() {
         let robot = robot(name);
@@ -160,9 +162,8 @@ fn goals_hold_what_goes_in() {
 
 #[test]
 fn who_cannot_stand_there_is_told_once() {
-    let said = |entrants: &[Entrant]| {
-        World::on_field(field(), entrants, &WorldSettings::default()).unwrap_err().to_string()
-    };
+    let said =
+        |entrants: &[Entrant]| World::on_field(field(), entrants, &WorldSettings::default()).unwrap_err().to_string();
     let at = |x, y| entrant("nao", Side::Home, Pose::new(x, y, 0.0));
     let outside = said(&[at(0.0, 0.0), at(8.5, 0.0)]);
     assert!(outside.starts_with("robot 1 (nao): x 8.500") && outside.contains("within 8 m"), "{outside}");
@@ -171,10 +172,7 @@ fn who_cannot_stand_there_is_told_once() {
     assert!(overlap.starts_with("robot 2 (nao)") && overlap.contains("inside robot 1 (nao)"), "{overlap}");
     let post = said(&[at(7.0, 1.3)]);
     assert!(post.contains("inside a goal post"), "{post}");
-    assert!(matches!(
-        World::on_field(field(), &[], &WorldSettings::default()),
-        Err(SimError::State { .. })
-    ));
+    assert!(matches!(World::on_field(field(), &[], &WorldSettings::default()), Err(SimError::State { .. })));
     let mut world = World::on_field(field(), &[at(0.0, 0.0), at(1.0, 0.0)], &WorldSettings::default()).unwrap();
     let one = world.advance(&JointCommand::zeros(22), None).unwrap_err().to_string();
     assert!(one.contains("1 commands") && one.contains("2 robots"), "{one}");

@@ -1,0 +1,4 @@
+//! Integration tests of matches, one binary.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test stops at the first surprise")]
+
+mod physics;
