@@ -146,6 +146,11 @@ impl SensorSuite {
         }
     }
 
+    /// The robot was carried: the next reading is of where it is now, and nothing of before is still under way.
+    pub fn carried(&mut self) {
+        self.imu_velocity = None;
+    }
+
     /// Reads every sensor whose turn it is; to be called after each tick, and once at the start.
     pub fn sense(&mut self, world: &World) {
         let first = self.imu_velocity.is_none();
@@ -160,10 +165,10 @@ impl SensorSuite {
 
         let before = self.newest;
         self.newest = (self.newest + 1) % self.history.len();
-        let turn = self.ticks.is_multiple_of(self.every);
+        let turn = first || self.ticks.is_multiple_of(self.every);
         self.ticks += 1;
         if let Some(sights) = &mut self.sights {
-            if first {
+            if self.ticks == 1 {
                 sights.look_back(world, LOOK_BACK, &mut self.rng);
             }
             sights.look(world, &mut self.rng);

@@ -269,7 +269,8 @@ impl World {
         self.reset(&q, &v, ball)
     }
 
-    /// Puts robot `index` into a state (q: 7 + n, v: 6 + n), as hands would that carry it.
+    /// Puts robot `index` into a state (q: 7 + n, v: 6 + n), as hands would that carry it; its drives have no command
+    /// until the next one. Its [`crate::sensors::SensorSuite`] is to be told.
     ///
     /// # Errors
     /// When a vector has another length or holds something that is not finite.
@@ -279,6 +280,9 @@ impl World {
         self.data.qpos_mut()[q_at..q_at + q.len()].copy_from_slice(q);
         self.data.qvel_mut()[v_at..v_at + v.len()].copy_from_slice(v);
         self.data.forward();
+        if let Some(drives) = &mut self.bodies[index].drives {
+            drives.reset();
+        }
         Ok(())
     }
 

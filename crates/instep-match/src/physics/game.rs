@@ -238,7 +238,6 @@ impl PhysicsMatch {
         for i in 0..before.len() {
             if let Status::Down { since, .. } = court.robots[i].status
                 && time - since > PICK_UP
-                && playing
             {
                 self.referee.send_off(&mut court, i, Penalty::IncapableRobot);
             }
@@ -251,9 +250,10 @@ impl PhysicsMatch {
             let back = removed && robot.status == Status::Active;
             if robot.pose.distance(&pose) > CARRIED || back {
                 let (to, side) = (robot.pose, crate::game::side(robot.team));
-                self.arena.carry(i, to)?;
                 let [position_sigma, heading_sigma] = PLACED;
-                self.arena.seats[i].restart(Start::Near { pose: side.pose(&to), position_sigma, heading_sigma });
+                let start = Start::Near { pose: side.pose(&to), position_sigma, heading_sigma };
+                self.arena.carry(i, to)?;
+                self.arena.seats[i].restart(&self.arena.world, start);
             }
         }
         self.keep_events();

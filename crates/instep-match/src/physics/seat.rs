@@ -115,7 +115,9 @@ impl Seat {
     }
 
     /// It was carried and knows roughly where to.
-    pub(super) fn restart(&mut self, start: Start) {
+    pub(super) fn restart(&mut self, world: &World, start: Start) {
+        self.suite.carried();
+        self.suite.sense(world);
         self.player.restart(start);
     }
 }
