@@ -55,14 +55,15 @@ pub(crate) fn field(name: &str) -> Option<Field> {
     })
 }
 
-/// The landmarks that the server reports in the place of those of the lines that it draws: the penalty areas' at the
-/// areas' whole width from the middle, where half of it is meant, and none at the centre mark.
+/// The landmarks that the server reports in the place of those of the lines that it draws: those of both areas at the areas'
+/// whole width from the middle, where half of it is meant, and none at the centre mark.
 fn simulation(field: Field) -> Field {
     let mut landmarks = field.landmarks();
-    let (drawn, reported) = field.penalty_area.map_or((0.0, 0.0), |area| (area.width / 2.0, area.width));
+    let widths = [Some(field.goal_area), field.penalty_area].into_iter().flatten().map(|area| area.width);
     for landmark in &mut landmarks {
-        if matches!(landmark.class, LandmarkClass::L | LandmarkClass::T) && landmark.y.abs() == drawn {
-            landmark.y = reported.copysign(landmark.y);
+        let junction = matches!(landmark.class, LandmarkClass::L | LandmarkClass::T);
+        if let Some(width) = widths.clone().find(|width| junction && landmark.y.abs() == width / 2.0) {
+            landmark.y = width.copysign(landmark.y);
         }
     }
     landmarks.retain(|l: &Landmark| (l.x, l.y) != (0.0, 0.0));

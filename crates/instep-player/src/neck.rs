@@ -3,6 +3,9 @@
 use instep_robot::Robot;
 use nalgebra::Vector3;
 
+/// A head that turns faster than this shakes its camera and the walk below it, rad/s.
+const FASTEST: f64 = 2.0;
+
 /// A joint of the neck.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Turn {
@@ -10,7 +13,7 @@ struct Turn {
     /// +1 or -1: which way a positive angle turns.
     sign: f64,
     range: [f64; 2],
-    /// Half of the joint's speed limit, rad/s: a head that jerks shakes its camera.
+    /// How fast it is turned, rad/s.
     speed: f64,
 }
 
@@ -48,7 +51,12 @@ impl Neck {
                 }
                 let axis = data.link_rotation(link) * Vector3::from(model.jnt_axis()[j + 1]);
                 let turn = |sign: f64| {
-                    Some(Turn { joint: j, sign: sign.signum(), range: joint.range, speed: 0.5 * joint.speed })
+                    Some(Turn {
+                        joint: j,
+                        sign: sign.signum(),
+                        range: joint.range,
+                        speed: FASTEST.min(0.5 * joint.speed),
+                    })
                 };
                 if axis.z.abs() > 0.9 && neck.yaw.is_none() {
                     neck.yaw = turn(axis.z);

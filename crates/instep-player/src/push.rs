@@ -15,10 +15,12 @@ pub enum Way {
     Through([f64; 3]),
 }
 
-/// Remembers whether it is on its way through the ball.
+/// Remembers whether it is on its way through the ball, and by which foot.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Push {
     through: bool,
+    /// +1: the left foot, -1: the right one; chosen anew once the ball is far.
+    foot: Option<f64>,
 }
 
 impl Push {
@@ -30,7 +32,7 @@ impl Push {
 
     /// Something else is done.
     pub fn stop(&mut self) {
-        self.through = false;
+        *self = Self::default();
     }
 
     /// What to do at `pose` with a ball at `ball` (field frame, m) that is to go in `direction` (rad).
@@ -38,20 +40,27 @@ impl Push {
         let line = Pose::new(ball[0], ball[1], direction);
         // The robot from the ball, along and beside the wanted direction.
         let [along, beside] = line.local_from_outer(pose.position());
+        if along.hypot(beside) > 2.0 * settings.start {
+            self.foot = None;
+        }
+        // Where the robot is already, the ball lies before the nearer foot.
+        let foot = *self.foot.get_or_insert(if beside > 0.0 { -1.0 } else { 1.0 });
+        let own = -foot * settings.outward;
         let turned = wrap(direction - pose.heading);
-        let within = |errors: [f64; 2]| beside.abs() < errors[0] && turned.abs() < errors[1];
+        let off = beside - own;
+        let within = |errors: [f64; 2]| off.abs() < errors[0] && turned.abs() < errors[1];
         self.through = if self.through {
             within(settings.end) && along < 0.15
         } else {
             within(settings.begin) && along < -0.1 && along > -2.0 * settings.start
         };
         if !self.through {
-            let [x, y] = line.outer_from_local([-settings.start, 0.0]);
+            let [x, y] = line.outer_from_local([-settings.start, own]);
             return Way::Behind(Pose::new(x, y, direction));
         }
         // Across the line, in the robot's own axes: its heading is nearly the line's.
-        let across = -settings.steer[0] * beside;
-        let speed = settings.speed * (1.0 - 0.5 * (beside.abs() / settings.end[0]).min(1.0));
+        let across = -settings.steer[0] * off;
+        let speed = settings.speed * (1.0 - 0.5 * (off.abs() / settings.end[0]).min(1.0));
         let (s, c) = turned.sin_cos();
         Way::Through([c * speed - s * across, s * speed + c * across, settings.steer[1] * turned])
     }
@@ -99,7 +108,7 @@ mod tests {
             let Way::Behind(to) = Push::default().way(&settings, &pose, [0.0, 0.0], 0.0) else {
                 panic!("{pose:?} walks through the ball");
             };
-            assert!((to.x + settings.start).abs() < 1e-12 && to.y.abs() < 1e-12);
+            assert!((to.x + settings.start).abs() < 1e-12 && (to.y.abs() - settings.outward).abs() < 1e-12);
         }
     }
 }

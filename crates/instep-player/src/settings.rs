@@ -114,6 +114,8 @@ pub struct PushSettings {
     pub start: f64,
     /// Speed of the walk through the ball, m/s.
     pub speed: f64,
+    /// How far beside the robot's middle the ball is met: before a foot, m.
+    pub outward: f64,
     /// Errors across (m) and of the heading (rad) with which it may begin.
     pub begin: [f64; 2],
     /// Errors with which it is given up.
@@ -126,7 +128,15 @@ pub struct PushSettings {
 
 impl Default for PushSettings {
     fn default() -> Self {
-        Self { start: 0.55, speed: 0.5, begin: [0.12, 0.25], end: [0.30, 0.7], steer: [1.0, 1.2], ball_speed: 1.0 }
+        Self {
+            start: 0.7,
+            speed: 0.5,
+            outward: 0.1,
+            begin: [0.08, 0.25],
+            end: [0.30, 0.7],
+            steer: [1.0, 1.2],
+            ball_speed: 1.0,
+        }
     }
 }
 
@@ -186,6 +196,7 @@ impl Tuning {
             ("sight_range", self.sight_range, 0.5, 200.0),
             ("push.start", push.start, 0.2, 3.0),
             ("push.speed", push.speed, 0.05, 5.0),
+            ("push.outward", push.outward, 0.0, 0.5),
             ("push.begin[0]", push.begin[0], 0.01, 1.0),
             ("push.begin[1]", push.begin[1], 0.01, 3.0),
             ("push.end[0]", push.end[0], push.begin[0], 2.0),

@@ -48,6 +48,8 @@ enum Stance {
 pub struct Counts {
     /// Messages answered.
     pub cycles: u64,
+    /// Messages that told what belongs to a perception.
+    pub understood: u64,
     /// Messages that were none, or lacked something.
     pub malformed: u64,
     /// Falls.
@@ -71,6 +73,8 @@ pub struct Agent {
     stand: Vec<f64>,
     said: Option<Message>,
     beamed: f64,
+    /// Where it wants to stand at the kick-off.
+    wish: Option<Pose>,
     mode: String,
     reply: String,
     counts: Counts,
@@ -105,6 +109,7 @@ impl Agent {
             stand,
             said: None,
             beamed: f64::NEG_INFINITY,
+            wish: None,
             mode: String::new(),
             reply: String::new(),
             counts: Counts::default(),
@@ -177,6 +182,7 @@ impl Agent {
             _ => &[],
         };
         let cycle = self.body.take(&perception, under_way);
+        self.counts.understood += u64::from(cycle != Cycle::Incomplete);
         match cycle {
             Cycle::Incomplete => self.counts.malformed += 1,
             Cycle::Carried => {
@@ -211,7 +217,13 @@ impl Agent {
     fn look_at_game(&mut self, game: &GameNews) {
         let is = |team: &Option<String>| team.as_deref() == Some(self.team.as_str());
         self.body.set_side(is(&game.right) && !is(&game.left));
-        let state = mode::state(game, self.body.is_right());
+        let mut state = mode::state(game, self.body.is_right());
+        if state.state != PlayState::Ready {
+            self.wish = None;
+        } else if self.wish.is_some_and(|wish| self.body.pose().distance(&wish) < AWAY) {
+            // At its place nobody moves any more.
+            state.state = PlayState::Set;
+        }
         self.counts.score = state.score;
         self.senses.game = state;
         self.mode.clone_from(&game.mode);
@@ -270,6 +282,7 @@ impl Agent {
             return;
         }
         let Some(Motion::Walk { pose, .. }) = self.player.decision().map(|decision| decision.motion) else { return };
+        self.wish = Some(pose);
         if self.body.pose().distance(&pose) > AWAY {
             self.beamed = time;
             action::beam(&mut self.reply, &pose, self.body.is_right());

@@ -249,7 +249,8 @@ impl Body {
         for (name, polar) in &picture.landmarks {
             let Some(class) = class(name) else { continue };
             let (position, height) = ground(polar);
-            if height.abs() < 0.5 && position[0].hypot(position[1]) > 0.1 {
+            // A goal post is told by its top, which stands over its foot.
+            if (class == LandmarkClass::GoalPost || height.abs() < 0.5) && position[0].hypot(position[1]) > 0.1 {
                 sights.landmarks.push(Sight { class, position, confidence: 1.0, covariance: None });
             }
         }
@@ -312,6 +313,7 @@ fn class(name: &str) -> Option<LandmarkClass> {
         [b't', b'_', ..] => LandmarkClass::T,
         [b'x', b'_', ..] => LandmarkClass::X,
         [b'p', b'_', ..] => LandmarkClass::PenaltyMark,
+        [b'g', b'_', ..] => LandmarkClass::GoalPost,
         _ => return None,
     })
 }

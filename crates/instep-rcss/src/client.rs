@@ -18,6 +18,8 @@ use crate::{RcssError, agent};
 
 /// A server that says nothing for this long is dead.
 const SILENCE: Duration = Duration::from_secs(10);
+/// But this long while it takes a player in: it builds its whole world anew.
+const PATIENT: Duration = Duration::from_secs(60);
 /// How often a stop is looked for while nothing comes.
 const GLANCE: Duration = Duration::from_millis(200);
 /// For a connection, and before the first and the later tries to get another.
@@ -62,7 +64,7 @@ pub struct Tally {
     pub fell: u64,
     /// How often the line was dead and another was found.
     pub reconnects: u64,
-    /// Messages that were none.
+    /// Messages that were none, or lacked something.
     pub malformed: u64,
     /// Longest time from a message to its answer, ms.
     pub longest_ms: f64,
@@ -124,7 +126,7 @@ impl<'a> Client<'a> {
     /// # Errors
     /// When there is no server, it refuses this player, or what it sends is nothing that can be understood.
     pub fn run(mut self, stop: &AtomicBool, again: impl Fn() -> Result<Agent, RcssError>) -> Result<Tally, RcssError> {
-        let (mut refused, mut joined, mut told) = (0, false, false);
+        let (mut refused, mut strange, mut joined, mut told) = (0, 0, false, false);
         let begin = Instant::now();
         while !stop.load(Ordering::Relaxed) {
             let stream = match self.connect() {
@@ -163,16 +165,24 @@ impl<'a> Client<'a> {
                     }
                 }
                 End::Lost(why) => {
+                    // Lines that break are a server's; lines on which nothing was ever understood are something else's.
+                    strange = if self.agent.counts().understood > 0 { 0 } else { strange + 1 };
+                    if strange >= TRIES {
+                        let detail = format!("nothing that can be read, then: {why}");
+                        return Err(RcssError::Protocol { address: self.address(), detail });
+                    }
                     (self.say)(format!("{}: {why}; player {} tries again", self.address(), self.tally.number));
                     told = true;
                 }
             }
             let counts = self.agent.counts();
             self.tally.fell += counts.fell;
+            self.tally.malformed += counts.malformed;
             self.agent = again()?;
             std::thread::sleep(PAUSES[0]);
         }
         self.tally.fell += self.agent.counts().fell;
+        self.tally.malformed += self.agent.counts().malformed;
         if self.tally.cycles > 0 {
             self.tally.mean_ms /= self.tally.cycles as f64;
         }
@@ -222,8 +232,9 @@ impl<'a> Client<'a> {
                     inbox.push(&buffer[..count]);
                 }
                 Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {
-                    if heard.elapsed() > SILENCE {
-                        return Ok(End::Lost(format!("silent for {} s", SILENCE.as_secs())));
+                    let silence = if first { PATIENT } else { SILENCE };
+                    if heard.elapsed() > silence {
+                        return Ok(End::Lost(format!("silent for {} s", silence.as_secs())));
                     }
                     continue;
                 }
@@ -250,7 +261,6 @@ impl<'a> Client<'a> {
                         Ok(answer) => answer.to_owned(),
                         Err(why) => {
                             malformed += 1;
-                            self.tally.malformed += 1;
                             if malformed > MOST_MALFORMED {
                                 return Err(protocol(format!("message after message that cannot be read ({why:?})")));
                             }

@@ -30,9 +30,9 @@ impl Bits {
         self.0 = (self.0 << count) | u128::from(value & ((1 << count) - 1));
     }
 
-    /// A number between -most and most.
+    /// A number between -most and most, in an odd number of levels: zero is one of them.
     fn number(&mut self, value: f64, most: f64, count: u32) {
-        let levels = ((1_u64 << count) - 1) as f64;
+        let levels = ((1_u64 << count) - 2) as f64;
         self.put((((value / most).clamp(-1.0, 1.0) * 0.5 + 0.5) * levels).round() as u64, count);
     }
 
@@ -47,7 +47,7 @@ impl Bits {
     }
 
     fn take_number(&mut self, most: f64, count: u32) -> f64 {
-        (self.take(count) as f64 / ((1_u64 << count) - 1) as f64 * 2.0 - 1.0) * most
+        (self.take(count) as f64 / ((1_u64 << count) - 2) as f64 * 2.0 - 1.0) * most
     }
 }
 
@@ -107,8 +107,6 @@ impl Code {
         let known = bits.take(1) == 1;
         let position = [bits.take_number(self.half[0], 10), bits.take_number(self.half[1], 9)];
         let velocity = [bits.take_number(FASTEST, 5), bits.take_number(FASTEST, 5)];
-        // The middle of 32 levels is none of them: the slowest that can be told is a ball that lies.
-        let velocity = if velocity[0].hypot(velocity[1]) < 0.3 { [0.0; 2] } else { velocity };
         let age = bits.take(4) as f64 * STEPS[1];
         let mate = Mate { number, pose: Pose::new(x, y, heading), role, time_to_ball, able, penalised: false };
         Some(Message { mate, ball: known.then_some(HeardBall { position, velocity, age }) })
@@ -139,7 +137,7 @@ mod tests {
             prop_assert_eq!(heard.ball.is_some(), ball.is_some());
             if let (Some(a), Some(b)) = (heard.ball, ball) {
                 prop_assert!((a.position[0] - b.position[0]).hypot(a.position[1] - b.position[1]) < 0.06);
-                prop_assert!((a.velocity[0] - b.velocity[0]).abs() < 0.31 && (a.age - b.age).abs() <= 0.11);
+                prop_assert!((a.velocity[0] - b.velocity[0]).abs() < 0.21 && (a.age - b.age).abs() <= 0.11);
             }
         }
 
