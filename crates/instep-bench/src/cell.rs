@@ -6,6 +6,7 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
+use instep_kick::rolling::ball_velocity;
 use instep_kick::{BreakOff, KickEngine, KickPlan, KickRequest, Phase, Refusal};
 use instep_motion::phase::Side;
 use instep_robot::Robot;
@@ -157,7 +158,7 @@ pub fn run_cell(subject: &Subject, scenario: &Scenario, key: &CellKey) -> Result
             Some(world) if !scenario.varies_world() => world,
             slot => slot.insert(world(subject, scenario, &case)?),
         };
-        world_changes.extend(world.settings().changes(&subject.world()).into_iter().map(|change| change.key));
+        world_changes.extend(world.settings().changes(&subject.default_world()).into_iter().map(|change| change.key));
         let (outcome, plan_time, _) = run_case(subject, &key.engine, &case, world, &mut ticks)?;
         plan_times.push(plan_time);
         outcomes.push(outcome.map_err(|refusal| refusal.name().to_owned()));
@@ -210,7 +211,8 @@ pub struct Ran {
 pub type Tried = (Result<Kicked, Refusal>, f64, Option<Ran>);
 
 /// Plans and tries one case with the engine called `name`, from the stand or from where the engine says that its kicks start.
-/// Gives the outcome, the time of the plan (s) and what an accepted request led to.
+/// Where the robot has a camera, the engine is told the ball's velocity as it follows from the sights before the plan, not as it
+/// is. Gives the outcome, the time of the plan (s) and what an accepted request led to.
 ///
 /// # Errors
 /// When there is no such engine for the robot, the ball lies in it, or the simulation diverges.
@@ -228,6 +230,10 @@ pub fn run_case(
         Some(start) => (start.q, start.v, start.footprint),
         None => (robot.stand.clone(), vec![0.0; robot.nv()], subject.footprint),
     };
+    // The robot has looked at the ball before it is asked.
+    if let Some(mut gaze) = subject.gaze() {
+        gaze.aim(case.request.ball, &mut q[7..]);
+    }
     let mut rng = ChaCha8Rng::seed_from_u64(case.seed);
     rng.set_stream(START_STREAM);
     case.start.disturb(robot, &mut q, &mut v, &mut rng);
@@ -242,10 +248,14 @@ pub fn run_case(
     let mut sensors = Sensors::default();
     suite.read_into(0.0, &mut sensors);
 
+    let mut request = case.request;
+    if let (Some(sights), Some(camera)) = (suite.ball_sights(), &robot.camera) {
+        request.ball_velocity = ball_velocity(sights, camera, robot.data().point(&camera.at).z);
+    }
     let start = thread_seconds();
-    let planned = engine.plan(&case.request, &sensors);
+    let planned = engine.plan(&request, &sensors);
     let plan_time = thread_seconds() - start;
-    let plan = match planned.and_then(|plan| twin.plan(&case.request, &sensors).map(|_| plan)) {
+    let plan = match planned.and_then(|plan| twin.plan(&request, &sensors).map(|_| plan)) {
         Ok(plan) => plan,
         Err(refusal) => return Ok((Err(refusal), plan_time, None)),
     };
@@ -268,7 +278,7 @@ pub fn run_case(
         q,
         v,
         ball,
-        direction: case.request.direction,
+        direction: request.direction,
     };
     let forecast = engine.forecast();
     let mut timed =
@@ -279,7 +289,7 @@ pub fn run_case(
     kicked.grounded = grounded(robot, &trial, plan.foot, timed.swing);
     kicked.broken_off = engine.broken_off();
     kicked.precision = plan.precision;
-    Ok((Ok(kicked), plan_time, Some(Ran { request: case.request, plan, settings, trial })))
+    Ok((Ok(kicked), plan_time, Some(Ran { request, plan, settings, trial })))
 }
 
 fn judge(subject: &Subject, case: &Case, trial: &Trial) -> Kicked {

@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use instep_kick::adaptive::{AdaptiveKick, AdaptiveSettings, GRID_FILE, Stabiliser, load_grid};
 use instep_kick::dynamic::{DynamicKick, DynamicSettings};
+use instep_kick::gaze::{Gaze, Gazing};
 use instep_kick::policy::{LearnedKick, PolicySettings};
 use instep_kick::preview::{PreviewKick, PreviewSettings};
 use instep_kick::{BallModel, Build, Derive, KickEngine, Settings};
@@ -115,6 +116,8 @@ pub struct Subject {
     /// The footprint's origin in the world when the robot stands, m.
     pub footprint: [f64; 2],
     folder: PathBuf,
+    /// The world in which it is tried, where that is not its default one.
+    world: Option<WorldSettings>,
     /// Settings of the engines by their file's name, where they are not those of the folder.
     settings: BTreeMap<&'static str, String>,
 }
@@ -153,7 +156,7 @@ impl Subject {
             deceleration: ball.deceleration,
         };
         let footprint = [middle.x, middle.y];
-        Ok(Self { robot: Arc::new(robot), ball, size, footprint, folder, settings: BTreeMap::new() })
+        Ok(Self { robot: Arc::new(robot), ball, size, footprint, folder, world: None, settings: BTreeMap::new() })
     }
 
     /// The file that holds the settings of the engine called `name` for this robot.
@@ -214,19 +217,41 @@ impl Subject {
         Ok(self)
     }
 
-    /// The world's constants for this robot's ball.
+    /// The robot's default world: its ball, its drives and senses as they were built.
     #[must_use]
-    pub fn world(&self) -> WorldSettings {
-        world(&self.ball)
+    pub fn default_world(&self) -> WorldSettings {
+        world(&self.ball).as_built(&self.robot)
     }
 
-    /// The engine called `name`.
+    /// The world in which it is tried: the default one unless [`Subject::in_world`] says another.
+    #[must_use]
+    pub fn world(&self) -> WorldSettings {
+        self.world.unwrap_or_else(|| self.default_world())
+    }
+
+    /// The same robot, to be tried in another world.
+    #[must_use]
+    pub fn in_world(self, world: WorldSettings) -> Self {
+        Self { world: Some(world), ..self }
+    }
+
+    /// The engine called `name`, whose robot looks at the ball where it has a neck.
     ///
     /// # Errors
     /// When there is none, or its settings do not fit the robot.
     pub fn engine(&self, name: &str) -> Made {
         let file = self.settings_file(name)?.display().to_string();
-        (entry(name)?.make)(self, &file, &self.settings(name)?)
+        let engine = (entry(name)?.make)(self, &file, &self.settings(name)?)?;
+        Ok(match self.gaze() {
+            Some(gaze) => Box::new(Gazing::new(engine, gaze)),
+            None => engine,
+        })
+    }
+
+    /// The robot's neck, where it has one.
+    #[must_use]
+    pub fn gaze(&self) -> Option<Gaze> {
+        Gaze::of(&self.robot, self.footprint)
     }
 
     fn dynamic(&self, file: &str, text: &str, change: fn(&mut DynamicSettings)) -> Made {
@@ -259,7 +284,7 @@ impl Subject {
     }
 }
 
-/// The world's constants for a ball.
+/// The world's constants for a ball, with ideal drives and senses.
 #[must_use]
 pub fn world(ball: &BallModel) -> WorldSettings {
     let BallModel { mass, radius, deceleration, .. } = *ball;

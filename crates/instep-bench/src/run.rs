@@ -125,7 +125,13 @@ fn fingerprint(subject: &Subject, scenario: &Scenario, engine: &str) -> Result<u
     let settings = subject.settings(engine)?;
     let settings = settings.parse::<toml::Table>().map_or(settings, |table| table.to_string());
     let (joints, stand, mass) = (&robot.joints, &robot.stand, robot.mass());
-    let text = format!("{joints:?} {stand:?} {mass:?} {:?} {settings} {scenario:?}", subject.ball);
+    let text = format!(
+        "{joints:?} {stand:?} {mass:?} {:?} {settings} {scenario:?} {:?} {:?} {:?}",
+        subject.ball,
+        subject.world(),
+        robot.drives,
+        robot.senses
+    );
     let mix = |hash: u64, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
     Ok(text.bytes().fold(0xcbf2_9ce4_8422_2325, mix))
 }

@@ -2,6 +2,8 @@
 //!
 //! - [`request`]: what is asked, and the causes of a refusal; [`dialect`]: the request formats that teams already send.
 //! - [`ball`]: the ball that a robot plays.
+//! - [`gaze`]: a neck that keeps the camera on the ball, for any engine.
+//! - [`rolling`]: how fast the ball rolls, from the camera's sights of it.
 //! - [`settings`]: the files of a robot's folder, read and checked.
 //! - [`derive`]: those settings as they follow from a robot, so that a file holds only what differs.
 //! - [`engine`]: the trait that every engine implements.
@@ -24,11 +26,13 @@ pub mod dynamic;
 pub mod engine;
 mod error;
 pub mod feedforward;
+pub mod gaze;
 pub mod ik;
 pub mod playback;
 pub mod policy;
 pub mod preview;
 pub mod request;
+pub mod rolling;
 pub mod settings;
 pub mod track;
 pub mod tree;

@@ -129,6 +129,12 @@ impl Tree {
         self.moves[joint][link]
     }
 
+    /// The link that joint `joint` moves first.
+    #[must_use]
+    pub fn link_of(&self, joint: usize) -> usize {
+        self.link_of[joint]
+    }
+
     /// Scratch space.
     #[must_use]
     pub fn pose(&self) -> TreePose {

@@ -1,6 +1,7 @@
 //! Every constant of the world, each in one place, with its source. The defaults are a FIFA size-5 ball on short
 //! artificial turf; `validate` refuses what cannot be.
 
+use instep_robot::Robot;
 use serde::{Deserialize, Serialize};
 
 use crate::SimError;
@@ -183,6 +184,24 @@ impl std::fmt::Display for Change {
 }
 
 impl WorldSettings {
+    /// With the drives and senses of `robot` as they were built, and ticks of at most two milliseconds of which a whole number
+    /// makes a cycle of its bus.
+    #[must_use]
+    pub fn as_built(self, robot: &Robot) -> Self {
+        let Step { tick, far, near, near_distance } = self.step;
+        let whole = |long: f64, short: f64| long / (long / short - 1e-9).ceil().max(1.0);
+        let tick = whole(robot.drives.period, tick);
+        let far = whole(tick, far);
+        let step = Step { tick, far, near: whole(far, near), near_distance };
+        Self { drives: Fidelity::AsBuilt, senses: Fidelity::AsBuilt, step, ..self }
+    }
+
+    /// With ideal drives and senses; the steps stay.
+    #[must_use]
+    pub fn ideal(self) -> Self {
+        Self { drives: Fidelity::Ideal, senses: Fidelity::Ideal, ..self }
+    }
+
     /// In which constants this world differs from `default`, the robot's own world; in the order of their keys.
     #[must_use]
     pub fn changes(&self, default: &Self) -> Vec<Change> {

@@ -118,6 +118,8 @@ pub struct Steps {
     pub end: Vec<f64>,
     /// Numbers in a row.
     pub width: usize,
+    /// For each command that was offered to the drives: when (s), angles, speeds and torques of all joints.
+    pub commands: Vec<f64>,
 }
 
 /// A contact of the ball with a robot.
@@ -339,6 +341,12 @@ impl World {
             for (body, command) in self.bodies.iter_mut().zip(commands) {
                 if let Some(drives) = &mut body.drives {
                     drives.offer(self.time, command);
+                }
+            }
+            if let (Some(steps), Some(command)) = (&mut self.steps, commands.first()) {
+                steps.commands.push(self.time);
+                for part in [&command.positions, &command.velocities, &command.torques] {
+                    steps.commands.extend_from_slice(part);
                 }
             }
             let (count, dt) = if self.near { (step.near_per_far(), step.near) } else { (1, step.far) };
@@ -609,6 +617,12 @@ impl World {
     /// Robots that touched the ball in the last step; one that did so twice may come twice.
     pub fn robots_on_ball(&self) -> impl Iterator<Item = usize> {
         self.ball_contacts().map(|(robot, ..)| robot)
+    }
+
+    /// How far the encoders' zeros of the first robot are off, rad.
+    #[must_use]
+    pub fn encoder_offsets(&self) -> &[f64] {
+        &self.bodies[0].encoder_offsets
     }
 
     /// Pairs of robots that touched each other in the last step; a pair may come more than once.

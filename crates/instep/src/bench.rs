@@ -2,17 +2,19 @@
 
 mod worst;
 
-use std::path::PathBuf;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
 use instep_bench::directions::directions;
 use instep_bench::table::{csv, json, markdown, overview_markdown, rows, rows_over_seeds};
 use instep_bench::{Bench as KickBench, BenchError, LEADING, Scenario, Subject, page};
+use instep_sim::settings::Change;
 
 use crate::failure::Failure;
 use crate::output::{self, Output};
-use crate::{files, places};
+use crate::{files, places, worlds};
 
 /// The scenarios of a first look.
 const QUICK: [&str; 3] = ["straight", "match", "run-up"];
@@ -41,6 +43,9 @@ pub(crate) struct Bench {
     /// One seed, 30 requests and the scenarios straight, match and run-up, in place of everything
     #[arg(long)]
     quick: bool,
+    /// The world: "ideal" for perfect drives and senses, or a TOML file; what is absent in it keeps its default
+    #[arg(long, value_name = "FILE")]
+    world: Option<PathBuf>,
     /// Folder for bench.md, bench.csv, bench.json, bench.html and the worst kicks
     #[arg(long, value_name = "FOLDER", default_value = "out/bench")]
     out: PathBuf,
@@ -96,8 +101,12 @@ impl Bench {
         bar.finish_and_clear();
 
         let (each, all) = (rows(&cells), rows_over_seeds(&cells));
+        let world = match &self.world {
+            None => "The world is the default one: drives and senses as the robots have them.".to_owned(),
+            Some(world) => format!("**The world is not the default one: {}.**", changed(&bench, world)),
+        };
         let note = format!(
-            "{} requests a scenario, in {} seeds from {} on. In brackets, and small, the 95 % interval of a rate (Wilson). Hit, \
+            "{world} {} requests a scenario, in {} seeds from {} on. In brackets, and small, the 95 % interval of a rate (Wilson). Hit, \
              upright and all that follows are of the accepted requests, delivered of all: accepted, hit, upright, valid, within \
              15 degrees, 0.8 of the asked speed or more. A hit is a ball that leaves with 0.3 of the asked speed or more in a \
              kick that passed the audit; kicks that did not have no speed, direction or distance. Every start is as after \
@@ -107,7 +116,8 @@ impl Bench {
             bench.seeds.len(),
             self.seed,
         );
-        let text = format!("{}\n{}", overview_markdown(&cells), markdown(&all));
+        let changed = self.world.as_ref().map_or_else(String::new, |_| format!("{world}\n\n"));
+        let text = format!("{changed}{}\n{}", overview_markdown(&cells), markdown(&all));
         let page_text = format!(
             "# KickBench\n\nMade by `{}`.\n\n{note}\n\n## One line an engine and robot, over all scenarios\n\n{}\n## Everything\n\n{}",
             self.command(),
@@ -116,6 +126,7 @@ impl Bench {
         );
         let sweeps = directions(&cells);
         let mut object = json(&cells);
+        object["world_changes"] = serde_json::to_value(changes(&bench)).map_err(Failure::other)?;
         object["directions"] = serde_json::to_value(&sweeps).map_err(Failure::other)?;
         let mut batch = files::Batch::default();
         let shown = worst::pages(&bench, &cells, &self.out, &mut batch)?;
@@ -147,6 +158,9 @@ impl Bench {
             command += &format!(" --scenario {}", list(&self.scenario));
         }
         command += if self.quick { " --quick" } else { "" };
+        if let Some(world) = &self.world {
+            command += &format!(" --world {}", world.display());
+        }
         for (option, number) in [("requests", self.requests.map(|n| n as u64)), ("seeds", self.seeds)] {
             command += &number.map_or_else(String::new, |number| format!(" --{option} {number}"));
         }
@@ -168,7 +182,11 @@ impl Bench {
         let subjects = self
             .robot
             .iter()
-            .map(|name| Ok(Subject::of(places::robot(name)?)?))
+            .map(|name| {
+                let subject = Subject::of(places::robot(name)?)?;
+                let world = worlds::asked(self.world.as_deref(), &subject.default_world())?;
+                Ok(subject.in_world(world))
+            })
             .collect::<Result<Vec<_>, Failure>>()?;
         let asked = if self.engine.is_empty() { LEADING.map(str::to_owned).to_vec() } else { self.engine.clone() };
         for engine in &asked {
@@ -199,4 +217,16 @@ impl Bench {
             requests,
         })
     }
+}
+
+/// In which constants each robot's world is not its default one.
+fn changes(bench: &KickBench) -> BTreeMap<&str, Vec<Change>> {
+    let of = |subject: &Subject| subject.world().changes(&subject.default_world());
+    bench.subjects.iter().map(|subject| (subject.robot.name.as_str(), of(subject))).collect()
+}
+
+/// The same in words.
+fn changed(bench: &KickBench, world: &Path) -> String {
+    let words: BTreeSet<String> = changes(bench).into_values().flatten().map(|change| change.to_string()).collect();
+    format!("{}: {}", world.display(), words.into_iter().collect::<Vec<_>>().join("; "))
 }

@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use crate::failure::Failure;
 use crate::output::{self, Output, Paint};
-use crate::{kick, places, train};
+use crate::{places, train, worlds};
 
 /// The arguments of `instep eval`.
 #[derive(Debug, Args)]
@@ -28,7 +28,7 @@ pub(crate) struct Eval {
     /// Where in the policy's clip the trials start, in seconds
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0, allow_negative_numbers = true)]
     start: f64,
-    /// Constants of the world, as TOML; what is absent keeps its default
+    /// The world: "ideal" for perfect drives and senses, or a TOML file; what is absent in it keeps its default
     #[arg(long, value_name = "FILE")]
     world: Option<PathBuf>,
     /// Number of threads [default: one a core]; the result does not depend on it
@@ -56,8 +56,8 @@ impl Eval {
         train::threads(self.threads)?;
         let policy = train::policy(&self.policy)?;
         let robot = Arc::new(places::robot(&policy.header.robot)?);
-        let default = kick::default_world(&robot)?;
-        let world = kick::world_settings(self.world.as_deref(), &default)?;
+        let default = worlds::default(&robot)?;
+        let world = worlds::asked(self.world.as_deref(), &default)?;
         let world_changes = world.changes(&default);
         let evaluation =
             Evaluation { trials: self.trials, seed: self.seed, start: self.start, world, ..Evaluation::default() };

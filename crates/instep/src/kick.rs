@@ -14,21 +14,21 @@ use std::sync::Arc;
 
 use clap::Args;
 use instep_kick::policy::PolicyKick;
-use instep_kick::{BallModel, KickPlan, KickRequest, Playback, Settings, Strength};
+use instep_kick::{KickPlan, KickRequest, Playback, Strength};
 use instep_motion::phase::Side;
 use instep_motion::reference::{Reference, ReferenceKind};
 use instep_robot::Robot;
 use instep_robot::control::Controller;
 use instep_sim::audit::Rerun;
 use instep_sim::impact::Impact;
-use instep_sim::settings::{Change, WorldSettings};
+use instep_sim::settings::Change;
 use instep_sim::trial::{self, Trial, TrialSettings};
 use instep_sim::{BallState, World};
 use serde::Serialize;
 
 use crate::failure::Failure;
 use crate::output::Output;
-use crate::{files, places};
+use crate::{files, places, worlds};
 
 /// How long the trial goes on after the reference's impact, at least, s: time for the ball to fly and the robot to fall.
 const AFTERMATH: f64 = 1.2;
@@ -80,7 +80,7 @@ pub(crate) struct Kick {
     /// does again in MuJoCo's own Python
     #[arg(long, value_name = "FOLDER", conflicts_with = "requests")]
     steps: Option<PathBuf>,
-    /// Constants of the world, as TOML; what is absent keeps its default
+    /// The world: "ideal" for perfect drives and senses, or a TOML file; what is absent in it keeps its default
     #[arg(long, value_name = "FILE")]
     world: Option<PathBuf>,
 }
@@ -153,8 +153,8 @@ impl Kick {
             }
         };
         let Ready { robot, reference, reference_file, start, mut controller, mut twin, q, v } = ready;
-        let default = default_world(&robot)?;
-        let world = world_settings(self.world.as_deref(), &default)?;
+        let default = worlds::default(&robot)?;
+        let world = worlds::asked(self.world.as_deref(), &default)?;
         let phases = &reference.phases;
         let until = reference.duration().max(phases.t_impact + AFTERMATH);
         let duration = self.duration.unwrap_or(until - start);
@@ -252,7 +252,7 @@ impl Kick {
             (Some(file), _) => engine::load(file)?,
             (None, ball) => vec![self.request(ball, subject.engine(engine)?.own_start().map(|start| start.request))?],
         };
-        let world = world_settings(self.world.as_deref(), &subject.world())?;
+        let world = worlds::asked(self.world.as_deref(), &subject.default_world())?;
         let folders = engine::Folders { out: &self.out, steps: self.steps.as_deref() };
         engine::run(&subject, engine, &requests, world, self.seed, folders, output)
     }
@@ -270,39 +270,6 @@ impl Kick {
         request.direction = self.direction.unwrap_or(request.direction);
         request.strength = self.speed.map_or(request.strength, Strength::BallSpeed);
         Ok(request)
-    }
-}
-
-/// The world in which a robot is measured unless another is asked for: with the ball that it plays, where its folder has one.
-pub(crate) fn default_world(robot: &Robot) -> Result<WorldSettings, Failure> {
-    if !robot.folder().join(BallModel::FILE).exists() {
-        return Ok(WorldSettings::default());
-    }
-    Ok(instep_bench::engines::world(&BallModel::load(robot.folder())?))
-}
-
-/// The constants of the world: those of the file, where there is one, in place of the `default` ones.
-pub(crate) fn world_settings(path: Option<&Path>, default: &WorldSettings) -> Result<WorldSettings, Failure> {
-    let Some(path) = path else { return Ok(*default) };
-    // Read as it stands first, so that an error has its line.
-    let _: WorldSettings = places::settings("--world", path, "constants of the world")?;
-    let changes: toml::Table = places::settings("--world", path, "constants of the world")?;
-    let mut table = toml::Table::try_from(default).map_err(Failure::other)?;
-    overlay(&mut table, changes);
-    let settings: WorldSettings = table.try_into().map_err(|e| Failure::input(e).about(path.display()))?;
-    settings.validate().map_err(|e| Failure::from(e).about(path.display()))?;
-    Ok(settings)
-}
-
-/// Puts every value of `changes` in its place in `table`.
-fn overlay(table: &mut toml::Table, changes: toml::Table) {
-    for (key, value) in changes {
-        match (table.get_mut(&key), value) {
-            (Some(toml::Value::Table(inner)), toml::Value::Table(changes)) => overlay(inner, changes),
-            (_, value) => {
-                table.insert(key, value);
-            }
-        }
     }
 }
 

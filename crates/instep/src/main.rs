@@ -29,6 +29,7 @@ mod see;
 mod train;
 mod tune;
 mod walk;
+mod worlds;
 
 use std::process::ExitCode;
 

@@ -317,6 +317,11 @@ fn card(training: &Training) -> String {
         String::new(),
         format!("Follows `{}`; {} control steps, seed {}.", state.reference, state.steps, state.seed),
         String::new(),
+        format!(
+            "Trained with ideal drives and senses, in steps of {} ms; `instep eval` measures in the robot's own world.",
+            1e3 * training.scene.settings.world.step
+        ),
+        String::new(),
         "| steps | reward | link error / m | survival | threshold / m |".into(),
         "|---|---|---|---|---|".into(),
     ];

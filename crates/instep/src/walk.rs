@@ -9,14 +9,13 @@ use std::sync::Arc;
 use clap::Args;
 use instep_bench::walking::{self, Asked, WalkTask, Walked};
 use instep_robot::Robot;
-use instep_sim::settings::WorldSettings;
+use instep_sim::settings::Change;
 use instep_walk::{Velocity, WalkSettings};
 use serde::Serialize;
 
 use crate::failure::Failure;
-use crate::kick::world_settings;
 use crate::output::{self, Output, Paint};
-use crate::{files, places};
+use crate::{files, places, worlds};
 
 /// The longest walk, s.
 const LONGEST: f64 = 3600.0;
@@ -41,7 +40,7 @@ pub(crate) struct Walk {
     /// Seed of all sensor noise
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Constants of the world, a TOML file
+    /// The world: "ideal" for perfect drives and senses, or a TOML file; what is absent in it keeps its default
     #[arg(long, value_name = "FILE")]
     world: Option<PathBuf>,
     /// Push the trunk at this time in seconds for 0.1 s with this impulse in N s: T,X,Y
@@ -56,6 +55,8 @@ pub(crate) struct Walk {
 pub(crate) struct Made {
     robot: Arc<Robot>,
     task: WalkTask,
+    /// What is not as in the robot's default world.
+    world_changes: Vec<Change>,
     wanted: Option<Velocity>,
     walked: Walked,
 }
@@ -101,7 +102,9 @@ impl Walk {
         let settings = WalkSettings::load(&robot)?;
         let report = self.out.join("report.html");
         files::check_file(&report)?;
-        let world = world_settings(self.world.as_deref(), &WorldSettings::default())?;
+        let default = worlds::default(&robot)?;
+        let world = worlds::asked(self.world.as_deref(), &default)?;
+        let world_changes = world.changes(&default);
         let wanted = self.velocity.map(|[x, y, turn]| Velocity { x, y, turn });
         let asked = match (wanted, self.to) {
             (_, Some(goal)) => Asked::Goal(goal),
@@ -119,7 +122,7 @@ impl Walk {
         let walked = walking::walk(&robot, settings, &task, |time| bar.set_position((time * 10.0) as u64))?;
         bar.finish_and_clear();
 
-        let made = Made { robot, task, wanted, walked };
+        let made = Made { robot, task, world_changes, wanted, walked };
         let mut batch = files::Batch::default();
         page::page(&made).save(batch.stage(&report)?)?;
         batch.commit()?;
@@ -145,6 +148,9 @@ impl Made {
         let mut text = format!("{}\n", paint.strong(&self.robot.title));
         let mut row =
             |label: &str, value: String| text += &format!("  {} {value}\n", paint.faint(&format!("{label:<15}")));
+        for change in &self.world_changes {
+            row("changed world", paint.bad(&change.to_string()));
+        }
         if let Some(clipped) = self.clipped() {
             row("clipped", paint.warn(&clipped));
         }
@@ -226,6 +232,7 @@ struct Measures<'a> {
     wbc_p99_s: f64,
     tick_p99_s: f64,
     real_time_factor: f64,
+    world_changes: &'a [Change],
     report: &'a std::path::Path,
 }
 
@@ -258,6 +265,7 @@ impl<'a> Measures<'a> {
             wbc_p99_s: walked.tick_p99[0],
             tick_p99_s: walked.tick_p99[1],
             real_time_factor: walked.real_time_factor,
+            world_changes: &made.world_changes,
             report,
         }
     }

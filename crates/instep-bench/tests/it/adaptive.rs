@@ -1,4 +1,5 @@
-//! Paper 3's engine on NAO: few kicks of each of its scenarios, within the bounds that the whole ones must keep.
+//! Paper 3's engine on NAO: few kicks of each of its scenarios, within the bounds that the whole ones must keep. What is tested
+//! is the engine's mathematics, so drives and senses are ideal ones.
 
 use std::sync::Arc;
 
@@ -13,7 +14,9 @@ use instep_robot::Robot;
 use crate::root;
 
 fn nao() -> Subject {
-    Subject::load(&root("robots"), "nao").unwrap()
+    let subject = Subject::load(&root("robots"), "nao").unwrap();
+    let world = subject.default_world().ideal();
+    subject.in_world(world)
 }
 
 fn scenario(name: &str) -> Scenario {

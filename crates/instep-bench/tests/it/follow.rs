@@ -1,4 +1,4 @@
-//! A ball that is moved aside during the wind-up is followed by the foot.
+//! A ball that is moved aside during the wind-up is followed by the foot, with ideal drives and senses.
 
 use instep_bench::cell::{run_case, world};
 use instep_bench::{Scenario, Subject};
@@ -8,6 +8,8 @@ use crate::root;
 /// Where the kicking foot is when it meets the ball, m to the left, after the ball was moved by so much.
 fn foot_at_contact(engine: &str, moved: f64) -> f64 {
     let subject = Subject::load(&root("robots"), "nao").unwrap();
+    let ideal = subject.default_world().ideal();
+    let subject = subject.in_world(ideal);
     let scenario = Scenario::load(&root("scenarios").join("straight.toml")).unwrap();
     let mut case = scenario.cases(&subject.size, 1, 1)[0];
     case.request.direction = 0.0;

@@ -88,7 +88,7 @@ fn tried(key: &CellKey, ran: Ran, page: &Path, subject: &Subject) -> Tried {
     Tried {
         robot: Arc::clone(&subject.robot),
         source: Source::Asked { engine: key.engine.clone(), request, plan },
-        world_changes: settings.world.changes(&subject.world()),
+        world_changes: settings.world.changes(&subject.default_world()),
         settings,
         trial,
         report: page.to_owned(),

@@ -76,7 +76,7 @@ pub(super) fn run(
             files::check_file(file)?;
         }
     }
-    let world_changes = settings.changes(&subject.world());
+    let world_changes = settings.changes(&subject.default_world());
     let mut world = World::new(subject.robot.clone(), &settings)?;
     if let Some(folder) = kept {
         steps::prepare(folder, &mut world)?;

@@ -137,6 +137,41 @@ fn numbers_that_are_none() {
 }
 
 #[test]
+fn drives_senses_and_balls_that_cannot_be() {
+    for (from, to, words) in [
+        ("period = 0.001", "period = 0", ["drives.period", "0", "0.0001"]),
+        ("delay = 0.001\nsag", "delay = -0.001\nsag", ["drives.delay", "-0.001", "0 to 0.2 s"]),
+        ("sag = 0.05", "sag = 1.5", ["drives.sag", "1.5", "[0, 0.9]"]),
+        ("kind = \"torque\"", "kind = \"magic\"", ["line", "magic", "position_servo"]),
+        ("play = 0.001", "play = 7.0", ["group[0].play", "7", "joint's range"]),
+        ("static_friction = 0.48", "static_friction = 480", ["group[0].static_friction", "480", "torque"]),
+        ("[senses]\ndelay = 0.001", "[senses]\ndelay = -1", ["senses.delay", "-1", "0 to 0.2 s"]),
+        ("[senses]\ndelay", "[senses]\nlag", ["line", "lag", "delay"]),
+        ("field_of_view = [1.5, 1.2]", "field_of_view = [1.5, 4]", ["camera.field_of_view", "4", "3.1"]),
+    ] {
+        let folder = workspace();
+        edit(folder.path().join("prestoe/robot.toml"), |text| text.replacen(from, to, 1));
+        let words = [&["robot.toml"][..], &words].concat();
+        refused(folder.path(), &[&KICK[..], &["--robot", "./prestoe"]].concat(), &words);
+    }
+    let folder = workspace();
+    for (text, words) in [
+        ("ball = \"size-9\"\n", ["size-9", "size-5, size-1, spl-foam"]),
+        ("drives = \"perfect\"\n", ["perfect", "as_built"]),
+        ("[step]\ntick = 0\n", ["step.tick", "above 0"]),
+        ("[sensors]\ndelay = -0.1\n", ["sensors.delay", "at least 0"]),
+    ] {
+        std::fs::write(folder.path().join("world.toml"), text).unwrap();
+        let words = [&["world.toml"][..], &words].concat();
+        refused(folder.path(), &[&KICK[..], &["--world", "world.toml"]].concat(), &words);
+        refused(folder.path(), &["bench", "--quick", "--robot", "nao", "--world", "world.toml"], &words);
+        refused(folder.path(), &["walk", "--velocity", "0.1,0,0", "--world", "world.toml"], &words);
+    }
+    refused(folder.path(), &[&KICK[..], &["--world", "ideel"]].concat(), &["ideel", "no such file", "ideal"]);
+    refused(folder.path(), &[&KICK[..], &["--ball", "0.05,0"]].concat(), &["the ball at", "inside", "touches neither"]);
+}
+
+#[test]
 fn a_robot_file_whose_roles_name_joints_that_do_not_exist() {
     let folder = workspace();
     edit(folder.path().join("prestoe/robot.toml"), |text| {
