@@ -336,3 +336,6 @@ fn grounded(robot: &Robot, trial: &Trial, foot: Side, [from, to]: [f64; 2]) -> u
     };
     (0..record.len()).filter(during).filter(touches).count()
 }
+
+#[cfg(test)]
+mod tests;

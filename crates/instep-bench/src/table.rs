@@ -326,3 +326,6 @@ pub fn csv(rows: &[Row]) -> String {
 pub fn json(cells: &[CellResult]) -> serde_json::Value {
     serde_json::json!({ "rows": rows_over_seeds(cells), "seeds": rows(cells) })
 }
+
+#[cfg(test)]
+mod tests;

@@ -268,3 +268,6 @@ fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
         _ => Some(0.5 * (values[middle - 1] + values[middle])),
     }
 }
+
+#[cfg(test)]
+mod tests;

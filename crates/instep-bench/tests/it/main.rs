@@ -3,6 +3,7 @@
 
 mod adaptive;
 mod follow;
+mod gaze;
 
 use std::path::{Path, PathBuf};
 

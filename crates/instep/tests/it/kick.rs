@@ -82,3 +82,19 @@ fn a_missed_ball_is_told_and_no_number_made_up() {
     let text = instep(folder.path(), &arguments).stdout;
     assert!(String::from_utf8_lossy(&text).contains("did not touch the ball"));
 }
+
+#[test]
+fn the_world_is_as_built_unless_the_ideal_one_is_asked_for_and_named() {
+    let folder = tempfile::tempdir().unwrap();
+    leg_swing().save(&folder.path().join("swing.json")).unwrap();
+    let arguments = ["kick", "--reference", "swing.json", "--duration", "0.4"];
+    let run = |more: &[&str]| instep(folder.path(), &[&arguments[..], more].concat());
+    assert_eq!(object(&run(&["--json"]))["world_changes"].as_array().unwrap().len(), 0);
+    let ideal = object(&run(&["--json", "--world", "ideal"]));
+    let change = |key: &str| serde_json::json!({ "key": key, "default": "as_built", "value": "ideal" });
+    assert_eq!(ideal["world_changes"], serde_json::json!([change("drives"), change("senses")]));
+    let text = run(&["--world", "ideal"]).stdout;
+    assert!(String::from_utf8_lossy(&text).contains("drives \"ideal\" (default \"as_built\")"));
+    let page = std::fs::read_to_string(folder.path().join("out/kick/report.html")).unwrap();
+    assert!(page.contains("as_built"), "the report does not say that the world was changed");
+}
