@@ -32,6 +32,8 @@ pub struct Gaze {
     camera: Camera,
     /// Neck joints from the trunk on, each with the least and greatest angle, rad.
     neck: Vec<(usize, [f64; 2])>,
+    /// Its angles in the stand, rad.
+    stand: Vec<f64>,
     /// Links from the base to the camera.
     links: Vec<usize>,
     /// Height of the base above the ground, m.
@@ -67,6 +69,7 @@ impl Gaze {
         let [x, y, height] = [robot.stand[0], robot.stand[1], robot.stand[2]];
         Some(Self {
             pose: tree.pose(),
+            stand: neck.iter().map(|(joint, _)| robot.stand[7 + joint]).collect(),
             links: tree.links_carrying(&[camera.at.link]),
             tree,
             camera,
@@ -177,7 +180,14 @@ impl KickEngine for Gazing {
     }
 
     fn plan(&mut self, request: &KickRequest, sensors: &Sensors) -> Result<KickPlan, Refusal> {
-        let plan = self.engine.plan(request, sensors)?;
+        // The neck is not the engine's, which takes it for that of the stand.
+        let mut told = sensors.clone();
+        for (&(joint, _), stand) in self.gaze.neck.iter().zip(&self.gaze.stand) {
+            if let Some(angle) = told.joint_positions.get_mut(joint) {
+                *angle = *stand;
+            }
+        }
+        let plan = self.engine.plan(request, &told)?;
         self.ball = Some(self.gaze.before_base(request.ball));
         self.time = None;
         Ok(plan)

@@ -6,7 +6,7 @@
 
 use std::sync::Arc;
 
-use instep_kick::policy::{Policy, PolicyKick};
+use instep_kick::policy::{PERIOD, Policy, PolicyKick};
 use instep_robot::Robot;
 use instep_sim::settings::WorldSettings;
 use instep_sim::trial::{self, LimitViolation, Trial, TrialSettings};
@@ -179,7 +179,7 @@ fn kick(robot: &Arc<Robot>, policy: &Policy, evaluation: &Evaluation, world: &mu
         world: evaluation.world,
         seed: evaluation.seed,
         duration: end.max(contact + UPRIGHT) - evaluation.start,
-        control_period: evaluation.world.step.tick,
+        control_period: PERIOD.max(evaluation.world.step.tick),
         q,
         v,
         ball: BallState::at_rest(ball),

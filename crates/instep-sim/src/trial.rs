@@ -494,3 +494,6 @@ fn violations(robot: &Robot, peaks: &[JointPeak]) -> Vec<LimitViolation> {
     }
     found
 }
+
+#[cfg(test)]
+mod tests;

@@ -13,7 +13,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use clap::Args;
-use instep_kick::policy::PolicyKick;
+use instep_kick::policy::{PERIOD, PolicyKick};
 use instep_kick::{KickPlan, KickRequest, Playback, Strength};
 use instep_motion::phase::Side;
 use instep_motion::reference::{Reference, ReferenceKind};
@@ -152,7 +152,7 @@ impl Kick {
                 (self.with_policy(&file)?, Some(file))
             }
         };
-        let Ready { robot, reference, reference_file, start, mut controller, mut twin, q, v } = ready;
+        let Ready { robot, reference, reference_file, start, period, mut controller, mut twin, q, v } = ready;
         let default = worlds::default(&robot)?;
         let world = worlds::asked(self.world.as_deref(), &default)?;
         let phases = &reference.phases;
@@ -172,7 +172,7 @@ impl Kick {
             world,
             seed: self.seed,
             duration,
-            control_period: world.step.tick,
+            control_period: period.max(world.step.tick),
             q,
             v,
             ball: BallState::at_rest([x, y, world.ball.radius]),
@@ -203,6 +203,8 @@ struct Ready {
     reference_file: PathBuf,
     /// Where in the reference it starts, s.
     start: f64,
+    /// Period at which the controller is to be called, s; a tick where that is longer.
+    period: f64,
     controller: Box<dyn Controller>,
     /// The same again, for the audit's re-run.
     twin: Box<dyn Controller>,
@@ -223,7 +225,7 @@ impl Kick {
         };
         let (engine, twin) = (engine()?, Box::new(engine()?));
         let (q, v) = engine.initial_state();
-        Ok(Ready { robot, reference, reference_file, start, controller: Box::new(engine), twin, q, v })
+        Ok(Ready { robot, reference, reference_file, start, period: 0.0, controller: Box::new(engine), twin, q, v })
     }
 
     /// Runs a policy.
@@ -239,7 +241,7 @@ impl Kick {
         };
         let (engine, twin) = (engine()?, Box::new(engine()?));
         let (q, v) = engine.initial_state();
-        Ok(Ready { robot, reference, reference_file, start, controller: Box::new(engine), twin, q, v })
+        Ok(Ready { robot, reference, reference_file, start, period: PERIOD, controller: Box::new(engine), twin, q, v })
     }
 
     /// Kicks on request.

@@ -21,7 +21,7 @@ use crate::request::{KickRequest, Learned, Refusal, Strength};
 use crate::whole_body::foot::wrap;
 
 /// Period at which the commands are renewed, s; the policy itself is asked at its own, longer one.
-const PERIOD: f64 = 0.002;
+pub const PERIOD: f64 = 0.002;
 /// How far a speed that is asked may be from the policy's own, as a share of it.
 const SPEED_SHARE: f64 = 0.15;
 /// How fast a ball may roll that is taken to lie still, m/s.

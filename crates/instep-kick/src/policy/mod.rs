@@ -15,7 +15,7 @@ pub mod odometry;
 mod run;
 mod settings;
 
-pub use engine::LearnedKick;
+pub use engine::{LearnedKick, PERIOD};
 pub use file::{Policy, PolicyHeader};
 pub use follower::{Follower, FollowerSettings};
 pub use network::{Activation, Layer, Network, Normalizer};

@@ -33,6 +33,7 @@ pub(super) fn prepare(folder: &Path, world: &mut World) -> Result<(), Failure> {
 pub(super) fn write(folder: &Path, world: &mut World, trial: &Trial) -> Result<(), Failure> {
     let Some(steps) = &trial.record.steps else { return Ok(()) };
     let (robot, settings) = (world.robot().clone(), *world.settings());
+    let encoder_offsets = world.encoder_offsets().to_vec();
     let model = world.mujoco().model();
     let of_joints = |value: fn(&Joint) -> f64| robot.joints.iter().map(value).collect::<Vec<_>>();
     let about = serde_json::json!({
@@ -52,7 +53,7 @@ pub(super) fn write(folder: &Path, world: &mut World, trial: &Trial) -> Result<(
         "sag": robot.drives.sag,
         "drag": settings.ball.drag,
         "joints": robot.joints.iter().map(|joint| joint.name.as_str()).collect::<Vec<_>>(),
-        "encoder_offsets": world.encoder_offsets(),
+        "encoder_offsets": encoder_offsets,
         "torque": of_joints(|joint| joint.torque),
         "speed": of_joints(|joint| joint.speed),
         "corner": of_joints(|joint| joint.corner),
