@@ -12,7 +12,9 @@
    what of them reaches the drives and when (bus period, delay; angles alone for a position servo), and which torque
    comes out (PID or PD, dead zone, torque-speed line, sag of the supply, play of the gears). Those are the torques.
 3. Inverse. Which torques must the motors have given, by position, speed and acceleration alone? Those recorded, and
-   nowhere more than torque limit and torque-speed line allow.
+   nowhere more than torque limit and torque-speed line allow. The world's contact solver stops at a tolerance of
+   1e-10, and what it leaves over in stiff contacts would stand in the torques; so each step's acceleration is solved
+   for again, to the end. What the world's own accelerations leave is told beside it, with a limit of its own.
 4. Air: 1/2 rho c A v^2 on the ball. Nothing else touches the world from outside but a push on the base.
 
 Relative errors are those of a state or torque over 1 or over the largest of its kind. Exit code 1 if a check fails.
@@ -26,6 +28,7 @@ import mujoco
 import numpy as np
 
 LIMIT = 1e-6
+SOLVER_LIMIT = 2e-4  # what the solver leaves at most where a foot squeezes a stiff ball onto the ground
 GRACE = 1e-7  # times are sums of steps: a command that is this much early is on time
 AIR = 1.204  # kg/m^3
 
@@ -119,12 +122,13 @@ def main(folder):
     # Forward, from the first state alone. A jump of the ball between two steps is a hand's, and taken over.
     data.qpos[:], data.qvel[:] = qpos[0], qvel[0]
     mujoco.mj_forward(model, data)
-    worst = dict.fromkeys(("state", "drive", "inverse", "law", "air"), 0.0)
+    worst = dict.fromkeys(("state", "drive", "inverse", "solver", "law", "air"), 0.0)
 
     def note(name, value):
         worst[name] = max(worst[name], float(value))
 
     state_error = lambda found, told: (np.abs(found - told) / np.maximum(1, np.abs(told))).max()
+    solver = (model.opt.tolerance, model.opt.ls_tolerance, model.opt.iterations)
     again, inverse = mujoco.MjData(model), mujoco.MjData(model)
     free = slice(nq - 7, nq)
     time, offered = 0.0, 0
@@ -150,15 +154,19 @@ def main(folder):
         time += dt[i]
 
         # Inverse: what forces does this acceleration need? Those that are not contact, friction or passive are applied.
-        inverse.qpos[:], inverse.qvel[:], inverse.qacc[:] = qpos[i], qvel[i], data.qacc
-        mujoco.mj_inverse(model, inverse)
-        needed = inverse.qfrc_inverse.copy()
-        for body in (base, ball):
-            force = np.zeros(nv)
-            wrench = data.xfrc_applied[body]
-            mujoco.mj_applyFT(model, inverse, wrench[:3], wrench[3:], inverse.xipos[body], body, force)
-            needed -= force
-        note("inverse", (np.abs(needed - applied[i])[dofs] / limit).max())
+        model.opt.tolerance, model.opt.ls_tolerance, model.opt.iterations = 0, 1e-10, 1000
+        mujoco.mj_forward(model, again)
+        model.opt.tolerance, model.opt.ls_tolerance, model.opt.iterations = solver
+        for name, acceleration in (("solver", data.qacc), ("inverse", again.qacc)):
+            inverse.qpos[:], inverse.qvel[:], inverse.qacc[:] = qpos[i], qvel[i], acceleration
+            mujoco.mj_inverse(model, inverse)
+            needed = inverse.qfrc_inverse.copy()
+            for body in (base, ball):
+                force = np.zeros(nv)
+                wrench = data.xfrc_applied[body]
+                mujoco.mj_applyFT(model, inverse, wrench[:3], wrench[3:], inverse.xipos[body], body, force)
+                needed -= force
+            note(name, (np.abs(needed - applied[i])[dofs] / limit).max())
 
         # Full torque to the corner speed, then a line to none at the limit.
         torque, v = needed[dofs], qvel[i][dofs]
@@ -175,6 +183,7 @@ def main(folder):
         ("states, from the first alone", worst["state"], LIMIT),
         ("torques by the drives' law from the commands, share of the limit", worst["drive"], LIMIT),
         ("torques by inverse dynamics, share of the limit", worst["inverse"], LIMIT),
+        ("the same by the world's own accelerations", worst["solver"], SOLVER_LIMIT),
         ("inverse torque beyond torque limit or line, share of the limit", worst["law"], LIMIT),
         ("forces on base or ball that are no drive's", strange, 0.0),
         ("force of the air on the ball, N", worst["air"], 1e-9),
