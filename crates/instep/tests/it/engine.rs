@@ -1,13 +1,14 @@
-//! `instep kick --engine` and `instep bench`.
+//! `instep kick --engine` and `instep bench`. Where a test wants a kick that works, drives and senses are ideal.
 
 use crate::support::{assert_refused, instep, listing, object};
 
+const IDEAL: [&str; 2] = ["--world", "ideal"];
 const ASKED: [&str; 6] = ["kick", "--engine", "dynamic", "--robot", "wolfgang", "--json"];
 
 #[test]
 fn a_kick_on_request_is_shown_and_recorded() {
     let folder = tempfile::tempdir().unwrap();
-    let run = instep(folder.path(), &[&ASKED[..], &["--ball", "0.2,-0.05", "--speed", "1.2"]].concat());
+    let run = instep(folder.path(), &[&ASKED[..], &IDEAL, &["--ball", "0.2,-0.05", "--speed", "1.2"]].concat());
     let answer = &object(&run)["requests"][0];
     assert!(answer["refused"].is_null(), "{answer}");
     let kicked = &answer["kicked"];
@@ -17,6 +18,19 @@ fn a_kick_on_request_is_shown_and_recorded() {
     let page = std::fs::read_to_string(folder.path().join(answer["report"].as_str().unwrap())).unwrap();
     assert!(page.contains("engine dynamic, right foot"), "the page does not say what was asked");
     assert!(folder.path().join(answer["recording"].as_str().unwrap()).exists());
+}
+
+#[test]
+fn a_kick_as_built_is_judged_by_the_same_keys() {
+    let folder = tempfile::tempdir().unwrap();
+    let asked = object(&instep(folder.path(), &[&ASKED[..], &["--ball", "0.2,-0.05", "--speed", "0.8"]].concat()));
+    assert_eq!(asked["world_changes"].as_array().unwrap().len(), 0);
+    let answer = &asked["requests"][0];
+    assert!(answer["refused"].is_null(), "{answer}");
+    for key in ["converged", "audit", "touches"] {
+        assert!(!answer[key].is_null(), "{key}");
+    }
+    assert!(answer["kicked"]["upright"].is_boolean() && answer["kicked"]["delivered"].is_boolean(), "{answer}");
 }
 
 #[test]
@@ -52,7 +66,7 @@ fn many_requests_come_from_a_file_each_with_its_answer() {
     let lines = "{\"ball\": [0.2, -0.05], \"direction\": 0.1, \"strength\": {\"ball_speed\": 1.0}}\n\
                  {\"ball\": [-0.2, 0.0], \"direction\": 0.0, \"strength\": {\"ball_speed\": 1.0}}\n";
     std::fs::write(folder.path().join("asked.jsonl"), lines).unwrap();
-    let answers = object(&instep(folder.path(), &[&ASKED[..], &["--requests", "asked.jsonl"]].concat()));
+    let answers = object(&instep(folder.path(), &[&ASKED[..], &IDEAL, &["--requests", "asked.jsonl"]].concat()));
     assert!(answers["requests"][0]["kicked"]["hit"].as_bool().unwrap());
     assert_eq!(answers["requests"][1]["refused"]["cause"], "ball_behind");
 }
@@ -63,7 +77,7 @@ fn a_benchmark_gives_the_promised_rows_and_goes_on_where_it_was_stopped() {
     let ask = |more: &[&str]| {
         let fixed =
             ["bench", "--engine", "dynamic", "--robot", "wolfgang", "--requests", "2", "--seeds", "1", "--json"];
-        instep(folder.path(), &[&fixed[..], more].concat())
+        instep(folder.path(), &[&fixed[..], &IDEAL, more].concat())
     };
     let first = object(&ask(&["--scenario", "straight"]));
     for key in [
@@ -91,6 +105,9 @@ fn a_benchmark_gives_the_promised_rows_and_goes_on_where_it_was_stopped() {
         assert!(!first["rows"][0][key].is_null(), "{key}");
     }
     assert_eq!(first["rows"][0]["hit_rate"], 1.0);
+    assert_eq!(first["world_changes"]["wolfgang"][0]["key"], "drives");
+    let page = std::fs::read_to_string(folder.path().join("out/bench/bench.md")).unwrap();
+    assert!(page.contains("--world ideal") && page.contains("The world is not the default one"), "{page}");
     for file in ["bench.md", "bench.csv", "bench.json", "bench.html"] {
         assert!(folder.path().join("out/bench").join(file).exists(), "{file}");
     }
