@@ -269,3 +269,6 @@ fn greatest(
         }
     }
 }
+
+#[cfg(test)]
+mod tests;
