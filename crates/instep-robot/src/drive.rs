@@ -104,8 +104,7 @@ impl Drive {
     pub fn torque(&mut self, joint: &Joint, kind: DriveKind, target: &Target, now: &Measured) -> f64 {
         let error = target.position - now.position;
         let error = error - error.clamp(-joint.dead_zone, joint.dead_zone);
-        let stall = joint.torque / (1.0 - joint.corner);
-        let slope = stall / joint.speed;
+        let (stall, slope) = joint.motor();
         let per_torque = now.step * now.inverse_inertia;
         let torque = match kind {
             DriveKind::Torque => {
@@ -228,6 +227,45 @@ impl Drives {
     #[must_use]
     pub fn active(&self) -> &JointCommand {
         &self.active
+    }
+}
+
+/// Speed over which dry friction is taken to turn round, rad/s.
+const TURNING: f64 = 0.1;
+
+/// Puts what the drives of `robot` cannot be told into what they can. A torque drive takes a command as it is. A position
+/// servo gets the angle at which its own law gives the wanted torque on the wanted motion, as far ahead as the command is late:
+/// with the servo's stiffness p, its damping and back-EMF d, and the friction f of the joint, the angle is
+/// q + v delay + (torque + d v + f) / p, beyond the dead zone by the dead zone. What p cannot hold stays as an error; play
+/// cannot be told. Speeds and torques become zero. Allocates nothing.
+pub fn tell(robot: &Robot, command: &mut JointCommand) {
+    let DriveSettings { kind, delay, .. } = robot.drives;
+    if kind == DriveKind::Torque {
+        return;
+    }
+    for (i, joint) in robot.joints.iter().enumerate() {
+        command.positions[i] =
+            joint.servo_target(command.positions[i], command.velocities[i], command.torques[i], delay);
+        (command.velocities[i], command.torques[i]) = (0.0, 0.0);
+    }
+}
+
+impl Joint {
+    /// The torque (N m) at standstill on the whole voltage, and what a motor loses of it for each rad/s (N m s/rad).
+    fn motor(&self) -> (f64, f64) {
+        let stall = self.torque / (1.0 - self.corner);
+        (stall, stall / self.speed)
+    }
+
+    /// The angle (rad) to send a position servo that is to be at `position` (rad) with `velocity` (rad/s) and `torque` (N m) when
+    /// the command acts `delay` (s) later; see [`tell`]. Within the joint's range by what the torque needs.
+    fn servo_target(&self, position: f64, velocity: f64, torque: f64, delay: f64) -> f64 {
+        let Pid { p, d, .. } = self.pid;
+        let friction = self.static_friction * velocity / (velocity.abs() + TURNING) + self.viscous_friction * velocity;
+        let needed = (torque + friction + (d + self.motor().1) * velocity) / p;
+        let dead = if self.dead_zone > 0.0 { self.dead_zone * needed / (needed.abs() + self.dead_zone) } else { 0.0 };
+        let target = position + velocity * delay + needed + dead;
+        if target.is_finite() { target } else { position }
     }
 }
 

@@ -31,6 +31,9 @@ pub(crate) struct Stroke {
     pub(crate) axis: Vector3<f64>,
     /// Pitch of the foot over its way, rad/m.
     pub(crate) pitch: f64,
+    /// How much the foot rises over its way at the contact. It comes from the same height as that of the contact and dips on
+    /// its way, as a pendulum does.
+    pub(crate) rise: f64,
 }
 
 impl Stroke {
@@ -40,7 +43,11 @@ impl Stroke {
         let yaw = Rotation3::from_axis_angle(&Vector3::z_axis(), self.yaw);
         let pitched = yaw * Rotation3::from_axis_angle(&Vector3::y_axis(), pitch) * self.axis;
         let face = windup_point(&(self.contact + yaw * self.axis), self.direction, -way);
-        let sole = face - pitched;
+        let mut sole = face - pitched;
+        // The arc's height over the contact: none at the wind-up, half of the straight rise at the end.
+        let over =
+            if way < 0.0 { (1.0 + way / self.windup).max(0.0) } else { 1.0 - 0.5 * (way / self.follow).min(1.0) };
+        sole.z += self.rise * way * over;
         [sole.x, sole.y, sole.z, self.yaw, pitch]
     }
 

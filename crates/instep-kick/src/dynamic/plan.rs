@@ -18,10 +18,23 @@ use crate::ik::Ik;
 use crate::request::{KickRequest, Place, Refusal};
 use crate::whole_body::body::Body;
 use crate::whole_body::foot::{FacePoint, contact_point, paper_choice, paper_face, wrap};
-use crate::whole_body::forecast::{Demands, FAR, MIDDLE, NEAR, ROLL, Rehearsal, check_place, fastest, graver, judge};
+use crate::whole_body::forecast::{Demands, FAR, MIDDLE, NEAR, ROLL, Rehearsal, check_place, graver, judge};
 use crate::whole_body::motion::{Motion, goals};
 use crate::whole_body::torque::Dynamics;
 
+/// The share of the asked speed below which a slower stroke is no answer.
+const SLOWEST: f64 = 0.88;
+/// Way over which the joints' speeds at the contact are taken, m.
+const WAY: f64 = 0.01;
+/// Share of the speed limit up to which a stroke is left as the settings have it.
+const CALM: f64 = 0.6;
+/// How far and in which steps pitch (rad/m) and rise are searched.
+const PITCHES: u8 = 16;
+const PITCH_STEP: f64 = 0.5;
+const RISES: u8 = 10;
+const RISE_STEP: f64 = 0.05;
+/// Least height of the swing foot over the ground in the forecast, m.
+const GROUND: f64 = 0.004;
 /// Speeds of joints after the contact, in units of their limits, up to which they come back in time.
 const LATE: f64 = 1.5;
 /// Least and greatest angle from the foot's x axis at which a corner strikes, rad.
@@ -80,11 +93,17 @@ pub(crate) struct Planned {
 #[derive(Debug)]
 pub(crate) struct Planner {
     rehearsal: Rehearsal,
+    /// Shares of the joints' speed limits for each metre of the foot's way, for each metre that it rises, and for each radian
+    /// that it pitches up.
+    rates: [Vec<f64>; 3],
 }
 
 impl Planner {
     pub(crate) fn new(body: &Body, settings: &DynamicSettings, ik: Ik, dynamics: Dynamics) -> Self {
-        Self { rehearsal: Rehearsal::new(body, &settings.manner(), ik, dynamics) }
+        Self {
+            rehearsal: Rehearsal::new(body, &settings.manner(), ik, dynamics),
+            rates: std::array::from_fn(|_| vec![0.0; body.robot.joints.len()]),
+        }
     }
 
     /// Plans `request`.
@@ -158,7 +177,7 @@ impl Planner {
                 foot_speed: candidate.stroke.speed,
                 calm: [[1.0; 2], [LATE; 2]],
                 roll: ROLL,
-                ground: f64::NEG_INFINITY,
+                ground: GROUND,
             };
             let forecast = if whole {
                 self.rehearsal.forecast(body, &motion, &demands).map_err(|(cause, _)| cause)
@@ -254,6 +273,7 @@ impl Planner {
             speed: 1.0,
             axis: point.axis,
             pitch: s.pitch,
+            rise: 0.0,
         };
 
         // Contact first: where it is out of reach, nothing else matters.
@@ -272,14 +292,12 @@ impl Planner {
         let change = (unit(request.direction) * ball_speed - ball_velocity).norm();
         let along = ball_velocity.dot(&toward.xy());
         stroke.speed = (change / body.ball.gain(mass) * s.speed_gain + along).max(0.1);
-        let ahead = 0.01;
-        let beyond = self.reach(body, settings, &stroke, stroke.pose(ahead), Place::Contact, NEAR);
-        let tried = &self.rehearsal;
-        let time = ahead / stroke.speed;
-        let share = fastest(&body.robot, 0..body.robot.joints.len(), &tried.saved, &tried.angles, time);
-        if beyond.is_ok() && share.0 > settings.limits.speed {
-            return Err(Refusal::TooFast { foot: swing, asked: stroke.speed, share: share.0, joint: share.1 });
+        let ease = self.ease(body, settings, &mut stroke);
+        let slower = (settings.limits.speed / ease.0).min(1.0);
+        if slower < SLOWEST {
+            return Err(Refusal::TooFast { foot: swing, asked: stroke.speed, share: ease.0, joint: ease.1 });
         }
+        stroke.speed *= slower;
 
         // The longest wind-up and follow-through there is room for.
         let mut failure = None;
@@ -302,10 +320,56 @@ impl Planner {
             return Err(cause);
         }
         // All that is added to the aim's cost is at least zero: the search leaves off by it.
-        let mut cost = aim.cost + share.0 / settings.limits.speed;
+        let mut cost = aim.cost + ease.0 / settings.limits.speed;
         cost += 0.8 * (1.0 - stroke.windup / s.windup) + 0.3 * (1.0 - stroke.follow / s.follow);
         cost += 0.3 * (1.0 - limit / 0.1).clamp(0.0, 1.0);
-        Ok(Candidate { stroke, cost, ball_speed })
+        Ok(Candidate { stroke, cost, ball_speed: ball_speed * slower })
+    }
+
+    /// Chooses how the foot pitches and rises at the contact so that the joints' speeds are easiest, for a stroke whose contact
+    /// pose is in `saved`: a straight way of a level foot lets one joint bind while others have much left. Gives the largest share
+    /// of a joint's speed limit that is left, and its joint.
+    fn ease(&mut self, body: &Body, settings: &DynamicSettings, stroke: &mut Stroke) -> (f64, usize) {
+        let base = Stroke { pitch: 0.0, rise: 0.0, ..*stroke };
+        let (ahead, here) = (base.pose(WAY), base.pose(0.0));
+        let moved = |axis: usize, by: f64| {
+            let mut pose = here;
+            pose[axis] += by;
+            pose
+        };
+        // Turning about the face moves the sole: the pose of a pitch by WAY x 1 rad/m, less the way itself.
+        let pitched = {
+            let mut pose = Stroke { pitch: 1.0, ..base }.pose(WAY);
+            (0..3).for_each(|axis| pose[axis] += here[axis] - ahead[axis]);
+            pose
+        };
+        let trunk = settings.manner().trunk_support(body, stroke.swing, stroke.yaw);
+        let tried = &mut self.rehearsal;
+        for (rates, pose) in self.rates.iter_mut().zip([ahead, moved(2, WAY), pitched]) {
+            tried.angles.copy_from_slice(&tried.saved);
+            tried.go(body, stroke.swing, &goals(&pose, &trunk), NEAR, ROLL);
+            for (j, rate) in rates.iter_mut().enumerate() {
+                *rate = (tried.angles[j] - tried.saved[j]) / WAY / body.robot.joints[j].speed;
+            }
+        }
+        let [way, up, turn] = &self.rates;
+        let mut best = (f64::INFINITY, (0.0, 0));
+        let (default, calm) = (stroke.pitch, CALM * settings.limits.speed);
+        for p in 0..=PITCHES {
+            for r in 0..=RISES {
+                let pitch = default + f64::from(p) * PITCH_STEP;
+                let rise = f64::from(r) * RISE_STEP;
+                let share = (0..way.len())
+                    .map(|j| (stroke.speed * (way[j] + rise * up[j] + pitch * turn[j]).abs(), j))
+                    .fold((0.0, 0), |most, next| if next.0 > most.0 { next } else { most });
+                let cost = share.0.max(calm) + 0.02 * (pitch - default) + 0.3 * rise;
+                if cost < best.0 {
+                    best = (cost, share);
+                    (stroke.pitch, stroke.rise) = (pitch, rise);
+                }
+            }
+        }
+        best.1
     }
 
     /// Moves the foot to `foot` by inverse kinematics and judges the pose.

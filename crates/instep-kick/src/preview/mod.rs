@@ -25,6 +25,7 @@ use std::sync::Arc;
 use instep_motion::phase::Side;
 use instep_robot::Robot;
 use instep_robot::control::{Controller, JointCommand, Sensors};
+use instep_robot::drive::tell;
 use nalgebra::Vector3;
 
 use crate::KickError;
@@ -357,6 +358,7 @@ impl Controller for PreviewKick {
         command.torques.copy_from_slice(&self.dynamics.torques);
         let moment = inertial(&self.body, &self.balance, swing, &tilt, sensors);
         turn_ankles(&self.body, &self.now, &footing, &moment, command);
+        tell(&self.body.robot, command);
     }
 }
 

@@ -6,6 +6,7 @@
 
 use instep_motion::phase::Side;
 use instep_robot::control::{JointCommand, Sensors};
+use instep_robot::drive::tell;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use crate::ik::{Goals, Ik};
@@ -155,6 +156,7 @@ impl Drive {
         command.velocities.copy_from_slice(self.dynamics.speeds());
         command.torques.copy_from_slice(&self.dynamics.torques);
         turn_ankles(body, &self.now, &footing, &moment, command);
+        tell(&body.robot, command);
     }
 
     /// The angles of the newest sample, rad.
