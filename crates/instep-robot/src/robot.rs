@@ -152,6 +152,14 @@ pub struct Robot {
 }
 
 impl Robot {
+    /// The same robot with drives that take angle, speed and torque of every command at once: what it is in an ideal world, so
+    /// that whoever steers it does not make up for servos that are not there. The bus keeps its cycle.
+    #[must_use]
+    pub fn with_ideal_drives(mut self) -> Self {
+        self.drives = DriveSettings { kind: DriveKind::Torque, delay: 0.0, ..self.drives };
+        self
+    }
+
     /// Loads a robot from its folder or its `robot.toml`.
     ///
     /// # Errors
