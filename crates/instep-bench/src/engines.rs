@@ -11,7 +11,7 @@ use instep_kick::policy::{LearnedKick, PolicySettings};
 use instep_kick::preview::{PreviewKick, PreviewSettings};
 use instep_kick::{BallModel, Build, Derive, KickEngine, Settings};
 use instep_robot::Robot;
-use instep_sim::settings::{Ball, WorldSettings};
+use instep_sim::settings::{Ball, Fidelity, WorldSettings};
 use instep_walk::in_gait::InGaitSettings;
 
 use crate::BenchError;
@@ -229,10 +229,14 @@ impl Subject {
         self.world.unwrap_or_else(|| self.default_world())
     }
 
-    /// The same robot, to be tried in another world.
+    /// The same robot, to be tried in another world; where that has ideal drives, its engines know it.
     #[must_use]
     pub fn in_world(self, world: WorldSettings) -> Self {
-        Self { world: Some(world), ..self }
+        let robot = match world.drives {
+            Fidelity::Ideal => Arc::new(Robot::clone(&self.robot).with_ideal_drives()),
+            Fidelity::AsBuilt => Arc::clone(&self.robot),
+        };
+        Self { world: Some(world), robot, ..self }
     }
 
     /// The engine called `name`, whose robot looks at the ball where it has a neck.

@@ -277,3 +277,50 @@ fn take(kind: DriveKind, command: &JointCommand, to: &mut JointCommand) {
         to.torques.copy_from_slice(&command.torques);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn knee() -> Joint {
+        Joint {
+            name: "knee".to_owned(),
+            group: 0,
+            range: [-0.1, 2.0],
+            torque: 3.0,
+            speed: 6.4,
+            corner: 0.6,
+            kp: 50.0,
+            kd: 1.2,
+            pid: Pid { p: 21.0, i: 0.0, d: 0.1 },
+            dead_zone: 0.0015,
+            play: 0.0,
+            static_friction: 0.15,
+            viscous_friction: 0.02,
+        }
+    }
+
+    /// On the wanted motion the servo's own law gives the wanted torque, and that against friction: the drive's law is the oracle.
+    #[test]
+    fn a_servo_that_is_told_its_target_gives_the_wanted_torque() {
+        let joint = knee();
+        for (velocity, torque) in [(0.0, 1.2), (0.0, -0.9), (1.5, 0.6), (-2.0, -0.4), (2.5, -1.0)] {
+            let target = Target { position: joint.servo_target(0.7, velocity, torque, 0.0), ..Target::default() };
+            let now = Measured { position: 0.7, velocity, voltage: 1.0, step: 1e-6, inverse_inertia: 1.0 };
+            let given = Drive::default().torque(&joint, DriveKind::PositionServo, &target, &now);
+            let friction = 0.15 * velocity / (f64::abs(velocity) + TURNING) + 0.02 * velocity;
+            assert!(
+                (given - torque - friction).abs() < 0.02,
+                "{velocity} rad/s: {given} N m for {torque} and {friction}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_target_leads_by_the_delay_and_a_torque_that_is_no_number_changes_nothing() {
+        let joint = knee();
+        let lead = joint.servo_target(0.7, 1.0, 0.0, 0.02) - joint.servo_target(0.7, 1.0, 0.0, 0.0);
+        assert!((lead - 0.02).abs() < 1e-12);
+        assert!((joint.servo_target(0.7, 1.0, f64::NAN, 0.02) - 0.7).abs() < 1e-12);
+    }
+}

@@ -13,7 +13,7 @@ use mujoco_rs::wrappers::mj_editing::MjSpec;
 use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::RobotError;
-use crate::drive::{DriveSettings, Pid};
+use crate::drive::{DriveKind, DriveSettings, Pid};
 use crate::model_file::{sane, spec};
 use crate::names::{Names, drives, joint_index, joints, self_collision};
 use crate::senses::{Camera, SenseSettings};

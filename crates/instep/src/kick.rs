@@ -256,6 +256,7 @@ impl Kick {
         };
         let world = worlds::asked(self.world.as_deref(), &subject.default_world())?;
         let folders = engine::Folders { out: &self.out, steps: self.steps.as_deref() };
+        let subject = subject.in_world(world);
         engine::run(&subject, engine, &requests, world, self.seed, folders, output)
     }
 }

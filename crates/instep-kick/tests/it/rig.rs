@@ -11,9 +11,10 @@ use instep_sim::sensors::SensorSuite;
 use instep_sim::settings::{Ball, WorldSettings};
 use instep_sim::{BallState, World};
 
+/// The robot in an ideal world: what the engines plan is tested here, not what servos make of it.
 pub(crate) fn robot(name: &str) -> Arc<Robot> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots").join(name);
-    Arc::new(Robot::load(&folder).unwrap())
+    Arc::new(Robot::load(&folder).unwrap().with_ideal_drives())
 }
 
 pub(crate) fn engine(name: &str) -> DynamicKick {

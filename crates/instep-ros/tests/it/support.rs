@@ -21,7 +21,9 @@ use ros2_client::{ActionTypeName, Name, NodeName, NodeOptions, QosProfile};
 pub(crate) type Lines = Arc<Mutex<Vec<String>>>;
 
 pub(crate) fn robot() -> Arc<Robot> {
-    Arc::new(Robot::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots/wolfgang")).unwrap())
+    Arc::new(
+        Robot::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots/wolfgang")).unwrap().with_ideal_drives(),
+    )
 }
 
 /// A simulation of small cost: the ball's impacts are not measured here.
