@@ -10,6 +10,9 @@ use crate::whole_body::body::Body;
 use crate::whole_body::foot::windup_point;
 use crate::whole_body::motion::{Motion, place};
 
+/// Length of the foot behind the striking face, in units of the face's distance from the sole's centre.
+const BEHIND: f64 = 1.5;
+
 /// The kicking part of a motion: everything that depends on the ball.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Stroke {
@@ -44,10 +47,14 @@ impl Stroke {
         let pitched = yaw * Rotation3::from_axis_angle(&Vector3::y_axis(), pitch) * self.axis;
         let face = windup_point(&(self.contact + yaw * self.axis), self.direction, -way);
         let mut sole = face - pitched;
-        // The arc's height over the contact: none at the wind-up, half of the straight rise at the end.
-        let over =
-            if way < 0.0 { (1.0 + way / self.windup).max(0.0) } else { 1.0 - 0.5 * (way / self.follow).min(1.0) };
-        sole.z += self.rise * way * over;
+        if way < 0.0 {
+            sole.z += self.rise * way * (1.0 + way / self.windup).max(0.0);
+        } else {
+            // What is behind the face goes down as the foot pitches up: the foot rises by as much until it rests.
+            let share = (way / self.follow).min(1.0);
+            let behind = BEHIND * self.axis.xy().norm();
+            sole.z += way * (self.rise * (1.0 - 0.5 * share) + self.pitch * behind * share);
+        }
         [sole.x, sole.y, sole.z, self.yaw, pitch]
     }
 

@@ -34,7 +34,7 @@ const PITCH_STEP: f64 = 0.5;
 const RISES: u8 = 10;
 const RISE_STEP: f64 = 0.05;
 /// Least height of the swing foot over the ground in the forecast, m.
-const GROUND: f64 = 0.004;
+const GROUND: f64 = 0.006;
 /// Speeds of joints after the contact, in units of their limits, up to which they come back in time.
 const LATE: f64 = 1.5;
 /// Least and greatest angle from the foot's x axis at which a corner strikes, rad.
@@ -353,12 +353,17 @@ impl Planner {
             }
         }
         let [way, up, turn] = &self.rates;
+        // A quintic that comes from the contact's height and rises at the end dips by 0.38 of the rise times the wind-up.
+        let most_rise = (stroke.contact.z - settings.swing.sole_least).max(0.0) / (0.38 * settings.swing.windup);
         let mut best = (f64::INFINITY, (0.0, 0));
         let (default, calm) = (stroke.pitch, CALM * settings.limits.speed);
         for p in 0..=PITCHES {
             for r in 0..=RISES {
                 let pitch = default + f64::from(p) * PITCH_STEP;
                 let rise = f64::from(r) * RISE_STEP;
+                if rise > most_rise {
+                    break;
+                }
                 let share = (0..way.len())
                     .map(|j| (stroke.speed * (way[j] + rise * up[j] + pitch * turn[j]).abs(), j))
                     .fold((0.0, 0), |most, next| if next.0 > most.0 { next } else { most });
