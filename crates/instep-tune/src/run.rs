@@ -49,6 +49,8 @@ struct Key {
     objective: Objective,
     tuning: Tuning,
     settings: String,
+    /// The world's constants, as JSON.
+    world: String,
     seed: u64,
 }
 
@@ -144,7 +146,8 @@ impl<'a> Run<'a> {
         }
         let cma = Cma::new(start, tuning.step, tuning.population, seed);
         let (engine, robot) = (engine.to_owned(), subject.robot.name.clone());
-        let key = Key { engine, robot, objective, tuning, settings, seed };
+        let world = serde_json::to_string(&subject.world()).unwrap_or_default();
+        let key = Key { engine, robot, objective, tuning, settings, world, seed };
         let state = State { key, cma, history: Vec::new(), best: Vec::new(), seconds: 0.0 };
         Ok(Self { subject, scenario, space, state })
     }
@@ -160,7 +163,7 @@ impl<'a> Run<'a> {
         found.key.tuning.generations = self.state.key.tuning.generations;
         if found.key != self.state.key {
             let detail =
-                "is of another tuning: engine, robot, objective, tuning file, settings or seed are not the same";
+                "is of another tuning: engine, robot, objective, tuning file, settings, world or seed are not the same";
             return Err(TuneError::file(file, detail));
         }
         self.state = found;

@@ -12,7 +12,7 @@ use instep_tune::{Objective, Run, TuneError, Tuned, Tuning, page};
 use crate::failure::Failure;
 use crate::interrupt::{self, INTERRUPTED};
 use crate::output::{self, Output, Paint};
-use crate::{files, places};
+use crate::{files, places, worlds};
 
 /// The arguments of `instep tune`.
 #[derive(Debug, Args)]
@@ -34,6 +34,9 @@ pub(crate) struct Tune {
     /// Cases on which before and after are compared; the tuning sees none of them
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u64).range(1..=100_000))]
     trials: u64,
+    /// The world: "ideal" for perfect drives and senses, or a TOML file; what is absent in it keeps its default
+    #[arg(long, value_name = "FILE")]
+    world: Option<PathBuf>,
     /// Folder for settings.toml, report.html, tune.json and the checkpoint
     #[arg(long, value_name = "FOLDER", default_value = "out/tune")]
     out: PathBuf,
@@ -83,6 +86,10 @@ impl Tune {
     /// When a name is not known, a file cannot be used, nothing can be measured, or a simulation diverges.
     pub(crate) fn run(self, output: &Output) -> Result<ExitCode, Failure> {
         let subject = Subject::of(places::robot(&self.robot)?)?;
+        let default = subject.default_world();
+        let world = worlds::asked(self.world.as_deref(), &default)?;
+        let world_changes = world.changes(&default);
+        let subject = subject.in_world(world);
         subject.settings(&self.engine)?;
         let file = match &self.tuning {
             Some(file) => places::tuning(file)?,
@@ -132,7 +139,11 @@ impl Tune {
         let bench = [before?, after?];
         bar.finish_and_clear();
 
-        let object = serde_json::json!({ "tuned": &tuned, "bench": { "before": &bench[0], "after": &bench[1] } });
+        let object = serde_json::json!({
+            "tuned": &tuned,
+            "world_changes": world_changes,
+            "bench": { "before": &bench[0], "after": &bench[1] },
+        });
         let mut batch = files::Batch::default();
         let write = |path: PathBuf, text: &str| {
             std::fs::write(&path, text)
@@ -142,7 +153,10 @@ impl Tune {
         write(batch.stage(json)?, &object.to_string())?;
         page::page(&tuned, [&bench[0], &bench[1]]).save(batch.stage(html)?)?;
         batch.commit()?;
-        output.show(&object, |paint| text(&tuned, paint, &self.out))?;
+        output.show(&object, |paint| {
+            let changes = world_changes.iter().map(|change| paint.bad(&format!("\nnot the default world: {change}")));
+            text(&tuned, paint, &self.out) + &changes.collect::<String>()
+        })?;
         Ok(ExitCode::SUCCESS)
     }
 }

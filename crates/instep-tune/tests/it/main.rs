@@ -14,8 +14,11 @@ fn scenario() -> Scenario {
     Scenario::load(&root("scenarios/straight.toml")).unwrap()
 }
 
+/// With ideal drives and senses: what is tested is the search, on kicks that work.
 fn nao() -> Subject {
-    Subject::load(&root("robots"), "nao").unwrap()
+    let subject = Subject::load(&root("robots"), "nao").unwrap();
+    let ideal = subject.default_world().ideal();
+    subject.in_world(ideal)
 }
 
 fn tuning(parameter: &str, bounds: [f64; 2]) -> Tuning {

@@ -22,7 +22,7 @@ fn write(folder: &Path, text: &str) {
 }
 
 fn arguments<'a>(more: &[&'a str]) -> Vec<&'a str> {
-    [&["tune", "preview", "--robot", "nao", "--tuning", "t.toml", "--trials", "1"], more].concat()
+    [&["tune", "preview", "--robot", "nao", "--tuning", "t.toml", "--trials", "1", "--world", "ideal"], more].concat()
 }
 
 #[test]
@@ -74,6 +74,7 @@ fn a_small_tuning_leaves_settings_a_report_and_a_checkpoint() {
     write(folder.path(), GOOD);
     let result = object(&instep(folder.path(), &arguments(&["--json", "--out", "o"])));
     assert_eq!(result["tuned"]["names"][0], "kick.time");
+    assert_eq!(result["world_changes"][0]["value"], "ideal");
     assert_eq!(result["tuned"]["measured"][1]["cases"], 1);
     let read = |name: &str| std::fs::read_to_string(folder.path().join("o").join(name)).unwrap();
     assert!(read("settings.toml").contains("[kick]") && read("report.html").contains("<html"));
