@@ -4,7 +4,8 @@
 //! - [`engines`]: which engines there are, and what a robot brings to its trials.
 //! - [`cell`]: one engine, robot, scenario and seed, run and measured.
 //! - [`reach`]: the reachability grid of the adaptive kick, measured in the world.
-//! - [`in_gait`]: the kick within a step as an engine; [`walking`]: one walk, run and measured.
+//! - [`in_gait`]: the kick within a step as an engine; [`walking`]: one walk, run and measured;
+//!   [`walk_bench`]: robots by walking scenarios.
 //! - [`walking_body`]: a robot that walks where navigation sends it, believing what localisation tells it.
 //! - [`run`]: all cells on all cores, with a file to resume from.
 //! - [`directions`]: how far the ball goes off the asked direction, and whether the engine knew.
@@ -24,6 +25,7 @@ pub mod reach;
 pub mod run;
 pub mod scenario;
 pub mod table;
+pub mod walk_bench;
 pub mod walking;
 pub mod walking_body;
 

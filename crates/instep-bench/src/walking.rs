@@ -5,7 +5,6 @@
 //! reaches the walker.
 
 use std::sync::Arc;
-use std::time::Instant;
 
 use instep_robot::Robot;
 use instep_robot::control::{JointCommand, Sensors};
@@ -18,6 +17,7 @@ use instep_walk::{Velocity, WalkSettings, Walker, approach};
 use nalgebra::{Quaternion, Rotation2, UnitQuaternion, Vector2, Vector3};
 
 use crate::BenchError;
+use crate::cpu::thread_seconds;
 
 /// The period of a torque-driven robot's control, s (paper 4: 1 kHz).
 pub const PERIOD: f64 = 0.001;
@@ -162,14 +162,14 @@ pub fn walk(
             }
         }
         suite.read_into(world.time(), &mut sensors);
-        let start = Instant::now();
+        let start = thread_seconds();
         let targets = walker.plan(&sensors);
-        let planned = start.elapsed();
+        let planned = thread_seconds();
         let outcome = walker.solve(&targets);
-        let solved = start.elapsed();
+        let solved = thread_seconds();
         walker.write(outcome, &mut command);
-        meter.solves.push((solved - planned).as_secs_f64());
-        meter.ticks.push(start.elapsed().as_secs_f64());
+        meter.solves.push(solved - planned);
+        meter.ticks.push(thread_seconds() - start);
         meter.look(time, asked, &walker, &world);
         world.advance(&command, None)?;
         suite.sense(&world);

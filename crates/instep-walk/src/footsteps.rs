@@ -5,7 +5,9 @@
 //! wanted. Momentum L about the contact is continuous through a touchdown at constant height, and nearly free of the ankle.
 //!
 //! State of one axis: p, centre of mass from the contact (m), and w = (L_y, -L_x) / (m H) (m/s). p' = w, w' = lambda^2 p.
-//! Predicts to the end of the step and one step on; knows no obstacles.
+//! Predicts to the end of the step and one step on; knows no obstacles. When the foothold is out of reach, the time of the step is changed
+//! (in the spirit of M. Khadiv, A. Herzog, S. A. A. Moosavian, L. Righetti, Walking control based on step timing adaptation, IEEE
+//! T-RO 36, 2020): a search over a few rates for the least momentum that is left over.
 
 use instep_motion::phase::Side;
 use nalgebra::{Rotation2, Vector2};
@@ -59,7 +61,7 @@ impl Pendulum {
     }
 
     /// Where to put foot `next` from the contact of the step that ends `left` (s) from now, m, for the mean velocity
-    /// `velocity` of a gait that turns at `turn` (rad/s). With `alpha` below 1 some of the present momentum is kept; the
+    /// `velocity` of a gait that turns at `turn` (rad/s) and whose touchdowns add `touchdown` (m/s) to the momentum. With `alpha` below 1 some of the present momentum is kept; the
     /// wanted momentum makes up for it, so that the periodic gait comes out as wanted whatever `alpha`.
     #[must_use]
     pub fn foothold(
@@ -68,6 +70,7 @@ impl Pendulum {
         left: f64,
         velocity: Vector2<f64>,
         turn: f64,
+        touchdown: Vector2<f64>,
         next: Side,
     ) -> Vector2<f64> {
         let end = self.ahead(state, left);
@@ -76,38 +79,118 @@ impl Pendulum {
         let kept = (1.0 - self.alpha) * ch;
         let turned = Rotation2::new(turn * self.step_time);
         let wanted = turned * self.wanted(velocity, next) - self.wanted(velocity, next.other()) * kept;
-        let start = (wanted - end.momentum * (self.alpha * ch)) / (self.lambda * sh);
+        let start = (wanted - (end.momentum * self.alpha + touchdown) * ch) / (self.lambda * sh);
         end.position - start
     }
 
     /// Where the support foot of the step that is `steps` from now stands, from the present contact, m, when the gait of
-    /// `velocity` goes on straight ahead; `support` is the present one, and `left` (s) of its step are left. Affine in
-    /// `velocity`.
+    /// `velocity` goes on straight ahead; `support` is the present one, and `left` (s) of its step are left; `touchdown` as for
+    /// [`Self::foothold`]. Affine in `velocity`.
     #[must_use]
     pub fn contact_after(
         &self,
         state: &PendulumState,
         left: f64,
         velocity: Vector2<f64>,
+        touchdown: Vector2<f64>,
         support: Side,
         steps: usize,
     ) -> Vector2<f64> {
         let (mut state, mut left, mut next) = (*state, left, support.other());
         let mut contact = Vector2::zeros();
         for _ in 0..steps {
-            let foothold = self.foothold(&state, left, velocity, 0.0, next);
+            let foothold = self.foothold(&state, left, velocity, 0.0, touchdown, next);
             let end = self.ahead(&state, left);
             contact += foothold;
-            state = PendulumState { position: end.position - foothold, momentum: end.momentum };
+            state = PendulumState { position: end.position - foothold, momentum: end.momentum + touchdown };
             (left, next) = (self.step_time, next.other());
         }
         contact
     }
 }
 
+/// Rates of the swing that are looked at, as powers of [`STEP`] of the nominal one.
+const POWERS: std::ops::RangeInclusive<i32> = -2..=8;
+/// See [`POWERS`].
+const STEP: f64 = 1.08;
+/// What a change of the rate costs beside the square of the momentum error over sqrt(g H), for the square of its logarithm.
+const HASTE: f64 = 0.02;
+
+/// How far a foot can be put from the other.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reach {
+    /// Ahead and back, m.
+    pub ahead: f64,
+    /// Across, least and greatest, m: no crossing, no split.
+    pub across: [f64; 2],
+}
+
+impl Reach {
+    /// The foothold of `foot` nearest to `step` that can be reached.
+    #[must_use]
+    pub fn clip(&self, step: Vector2<f64>, foot: Side) -> Vector2<f64> {
+        let outward = if foot == Side::Left { 1.0 } else { -1.0 };
+        let [near, far] = self.across;
+        Vector2::new(step.x.clamp(-self.ahead, self.ahead), outward * (outward * step.y).clamp(near, far))
+    }
+}
+
+/// A step that is to be made: how fast its phase runs (1/s), where to (m, from the contact, in the axes of its end).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Plan {
+    /// 1/s.
+    pub rate: f64,
+    /// m.
+    pub step: Vector2<f64>,
+}
+
+impl Pendulum {
+    /// The rate at which a step at `phase` goes on, and its foothold: nominal unless that is out of reach. `foothold` gives the wanted one
+    /// for the time that is left (s).
+    pub fn time(
+        &self,
+        phase: f64,
+        reach: &Reach,
+        foot: Side,
+        mut foothold: impl FnMut(&Self, f64) -> Vector2<f64>,
+    ) -> Plan {
+        let nominal = 1.0 / self.step_time;
+        let to_momentum = self.lambda * (self.lambda * self.step_time).sinh() * self.lambda / crate::settings::GRAVITY;
+        let mut judge = |power: i32| {
+            let rate = nominal * STEP.powi(power);
+            let wanted = foothold(self, ((1.0 - phase) / rate).max(0.0));
+            let step = reach.clip(wanted, foot);
+            let haste = f64::from(power) * STEP.ln();
+            ((wanted - step).norm_squared() * to_momentum.powi(2) + HASTE * haste * haste, Plan { rate, step })
+        };
+        let (cost, plan) = judge(0);
+        if cost == 0.0 {
+            return plan;
+        }
+        let better = POWERS.map(judge).min_by(|a, b| a.0.total_cmp(&b.0));
+        better.map_or(plan, |(_, plan)| plan)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_step_out_of_reach_is_made_sooner_and_one_in_reach_in_its_time() {
+        let pendulum = Pendulum { lambda: 3.73, step_time: 0.4, width: 0.2, alpha: 0.9 };
+        let reach = Reach { ahead: 0.65, across: [0.1, 0.55] };
+        let plan = |momentum: f64| {
+            let state = PendulumState { position: Vector2::new(0.0, 0.08), momentum: Vector2::new(0.0, momentum) };
+            pendulum.time(0.3, &reach, Side::Left, |pendulum, left| {
+                pendulum.foothold(&state, left, Vector2::zeros(), 0.0, Vector2::zeros(), Side::Left)
+            })
+        };
+        let calm = plan(0.0);
+        assert!((calm.rate - 2.5).abs() < 1e-12 && calm.step.y < 0.55, "{calm:?}");
+        let pushed = plan(0.7);
+        assert!(pushed.rate > 2.8 && pushed.step.y <= 0.55, "{pushed:?}");
+    }
 
     fn walk(alpha: f64, velocity: Vector2<f64>, steps: usize) -> (Vector2<f64>, f64, Vector2<f64>) {
         let pendulum = Pendulum { lambda: (9.81_f64 / 0.705).sqrt(), step_time: 0.4, width: 0.2, alpha };
@@ -117,7 +200,7 @@ mod tests {
         let mut end = PendulumState { position: Vector2::zeros(), momentum: Vector2::zeros() };
         for _ in 0..steps {
             side = side.other();
-            let step = pendulum.foothold(&state, pendulum.step_time, velocity, 0.0, side);
+            let step = pendulum.foothold(&state, pendulum.step_time, velocity, 0.0, Vector2::zeros(), side);
             end = pendulum.ahead(&state, pendulum.step_time);
             before = contact + end.position;
             state = PendulumState { position: end.position - step, momentum: end.momentum };
@@ -151,7 +234,7 @@ mod tests {
         let (mut side, mut way, mut mark) = (Side::Right, 0.0, [0.0; 2]);
         for step in 0..60 {
             side = side.other();
-            let foothold = pendulum.foothold(&state, 0.4, Vector2::new(0.0, 0.3), 0.0, side);
+            let foothold = pendulum.foothold(&state, 0.4, Vector2::new(0.0, 0.3), 0.0, Vector2::zeros(), side);
             let end = pendulum.ahead(&state, 0.4);
             state = PendulumState { position: end.position - foothold, momentum: end.momentum };
             way += foothold.y;

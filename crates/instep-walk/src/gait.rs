@@ -12,7 +12,8 @@ use instep_robot::control::JointCommand;
 use instep_robot::{Robot, RobotData};
 use nalgebra::{Rotation2, UnitQuaternion, Vector2, Vector3};
 
-use crate::footsteps::{Pendulum, PendulumState};
+use crate::footsteps::{Pendulum, PendulumState, Plan, Reach};
+use crate::offsets::Learner;
 use crate::settings::{GRAVITY, Velocity, WalkSettings};
 use crate::swing::{Swing, Waypoint};
 use crate::whole_body::{Outcome, Targets, WholeBody};
@@ -20,15 +21,19 @@ use crate::{StateEstimate, WalkError};
 
 /// How far the capture point may be from the middle of the feet when a gait ends, and how far before a standing robot steps:
 /// share of the half length of a foot, and share of half the distance across.
-const STOP: [f64; 2] = [0.3, 0.7];
+const STOP: [f64; 2] = [0.5, 0.75];
 /// See [`STOP`].
 const BALANCE: [f64; 2] = [0.9, 0.9];
 /// Farthest apart that the feet may be ahead when a gait ends, as a share of the height of the centre of mass.
 const STAGGER: f64 = 0.27;
 /// How much faster a gait slows down than it speeds up.
-const BRAKE: f64 = 3.0;
+const BRAKE: f64 = 8.0;
 /// What is left between the feet when they come closest in a walk sideways, m, beyond the nearest foothold.
 const SPARE: f64 = 0.01;
+/// How soon the rate of a step follows what is wanted of it, s.
+const RATE_LAG: f64 = 0.02;
+/// A step whose rate is farther off the nominal one than this share was disturbed.
+const DISTURBED: f64 = 0.1;
 /// Fastest change of the height of the centre of mass that is asked, as a share of the height a second.
 const HEIGHT_RATE: f64 = 0.35;
 
@@ -108,9 +113,13 @@ pub struct Gait {
     data: RobotData,
     body: WholeBody,
     pendulum: Pendulum,
+    learner: Learner,
     mode: Mode,
     /// When the present mode or step began, s.
     since: f64,
+    /// Of the step, and how fast it runs, 1/s.
+    phase: f64,
+    rate: f64,
     last_time: f64,
     /// Since the tick before, s.
     period: f64,
@@ -141,6 +150,7 @@ impl Gait {
         let data = robot.data();
         let body = WholeBody::new(Arc::clone(&robot), settings.control.clone());
         let gait = &settings.gait;
+        let step_time = gait.step_time;
         let pendulum = Pendulum {
             lambda: (GRAVITY / gait.height).sqrt(),
             step_time: gait.step_time,
@@ -166,9 +176,12 @@ impl Gait {
             settings,
             data,
             body,
+            learner: Learner::new(pendulum.lambda, pendulum.step_time),
             pendulum,
             mode: Mode::Stand,
             since: 0.0,
+            phase: 0.0,
+            rate: 1.0 / step_time,
             last_time: 0.0,
             period: 0.0,
             heading: 0.0,
@@ -214,6 +227,12 @@ impl Gait {
         &self.body
     }
 
+    /// What the pendulum leaves out, as learned so far.
+    #[must_use]
+    pub fn offsets(&self) -> crate::offsets::Offsets {
+        self.learner.offsets
+    }
+
     /// What happened how often.
     #[must_use]
     pub fn counts(&self) -> Counts {
@@ -233,9 +252,13 @@ impl Gait {
         if steps == 0 {
             return None;
         }
-        let left = (self.settings.gait.step_time - (self.last_time - self.since)).max(0.0);
-        let state = self.pendulum_state(support, heading);
-        let after = |x: f64| self.pendulum.contact_after(&state, left, Vector2::new(x, 0.0), support, steps).x;
+        let left = ((1.0 - self.phase) / self.rate).max(0.0);
+        let raw = self.pendulum_state(support, heading);
+        let touchdown = self.learner.offsets.touchdown;
+        let after = |x: f64| {
+            let state = self.learner.corrected(&raw, self.fed(x));
+            self.pendulum.contact_after(&state, left, Vector2::new(x, 0.0), touchdown, support, steps).x
+        };
         let (still, slope) = (after(0.0), after(1.0) - after(0.0));
         (slope.abs() > 1e-6).then(|| (way - still) / slope)
     }
@@ -324,6 +347,11 @@ impl Gait {
         PendulumState { position: turn * arm.xy(), momentum: turn * Vector2::new(about.y, -about.x) * scale }
     }
 
+    /// What the momentum of a gait ahead at `speed` (m/s) has beyond that of the pendulum, m/s.
+    fn fed(&self, speed: f64) -> Vector2<f64> {
+        Vector2::new(speed * (1.0 / self.settings.gait.speed_gain - 1.0), 0.0)
+    }
+
     /// Height of the ground under the feet that carry, m.
     fn ground(&self) -> f64 {
         match self.mode {
@@ -375,13 +403,15 @@ impl Gait {
             }
             Mode::Step { support } => {
                 let swing = support.other();
-                let phase = elapsed / gait.step_time;
-                let late = elapsed > gait.step_time + gait.latest;
-                if late || (phase > gait.earliest && state.contact[swing as usize]) {
+                self.phase += self.rate * self.period;
+                let late = self.phase > 1.0 + gait.latest * self.rate;
+                if late || (self.phase > gait.earliest && state.contact[swing as usize]) {
                     self.counts.late += usize::from(late && !state.contact[swing as usize]);
                     self.counts.steps += 1;
                     let position = self.view.feet[swing as usize];
                     self.footstep = Some(Footstep { time: state.time, side: swing, position, heading: self.heading });
+                    let begins = self.pendulum_state(swing, self.heading);
+                    self.learner.touch_down(&begins);
                     if self.may_stop() {
                         self.mode = Mode::Stand;
                         self.since = state.time;
@@ -432,6 +462,7 @@ impl Gait {
         self.mode = Mode::Step { support };
         self.since = time;
         self.waypoint = None;
+        (self.phase, self.rate) = (0.0, 1.0 / self.settings.gait.step_time);
     }
 
     fn base(&self) -> UnitQuaternion<f64> {
@@ -478,42 +509,55 @@ impl Gait {
     /// On `support`.
     fn step(&mut self, support: Side, time: f64) -> Targets {
         let gait = &self.settings.gait;
-        let (step_time, gain) = (gait.step_time, 1.0 / gait.speed_gain);
-        let ([near, far], reach) = (gait.across, gait.reach);
-        let width = gait.width;
-        let elapsed = time - self.since;
-        let phase = elapsed / step_time;
-        let left = (step_time - elapsed).max(0.0);
-        let swing = support.other();
+        let step_time = gait.step_time;
+        let reach = Reach { ahead: gait.reach, across: gait.across };
+        let (swing, phase) = (support.other(), self.phase);
+        let velocity = Vector2::new(self.velocity.x, self.velocity.y);
+        self.pendulum.width = gait.width.max(velocity.y.abs() * step_time + reach.across[0] + SPARE);
+        // A stop takes all momentum away at once.
+        self.pendulum.alpha = if self.asked.is_zero() { 1.0 } else { gait.alpha };
+        let (turn, fed, touchdown) = (self.velocity.turn, self.fed(velocity.x), self.learner.offsets.touchdown);
         // Frames turn: the foothold is chosen in the axes that the gait will have at the touchdown.
-        let heading = self.heading + self.velocity.turn * left;
-        let state = self.pendulum_state(support, heading);
-        let velocity = Vector2::new(self.velocity.x * gain, self.velocity.y);
-        self.pendulum.width = width.max(velocity.y.abs() * step_time + near + SPARE);
-        let mut step = self.pendulum.foothold(&state, left, velocity, self.velocity.turn, swing);
-        let outward = if swing == Side::Left { 1.0 } else { -1.0 };
-        step.x = step.x.clamp(-reach, reach);
-        step.y = outward * (outward * step.y).clamp(near, far);
+        let left = ((1.0 - phase) / self.rate).max(0.0);
+        let heading = self.heading + turn * left;
+        let raw = self.pendulum_state(support, heading);
+        let state = self.learner.corrected(&raw, fed);
+        let foothold =
+            |pendulum: &Pendulum, left: f64| pendulum.foothold(&state, left, velocity, turn, touchdown, swing);
+        if self.waypoint.is_none() {
+            let Plan { rate, .. } = self.pendulum.time(phase, &reach, swing, foothold);
+            self.rate += (rate - self.rate) * (1.0 - (-self.period / RATE_LAG).exp());
+        }
+        if (self.rate * step_time - 1.0).abs() > DISTURBED {
+            self.learner.forget_step();
+        }
+        let step = reach.clip(foothold(&self.pendulum, left), swing);
+        let end = self.pendulum.ahead(&state, left);
+        let planned = PendulumState { position: end.position - step, momentum: end.momentum };
+        self.learner.look(time, &raw, fed, planned);
         let moved = Rotation2::new(heading) * step;
         let contact = self.view.feet[support as usize];
         let foothold = contact + Vector3::new(moved.x, moved.y, 0.0);
         // The swing foot turns to the heading of the middle of its stance.
-        let to = heading + 0.5 * self.velocity.turn * step_time;
-        let (turned, rate) = ease(self.lift_off.1, to, phase, step_time);
+        let to = heading + 0.5 * turn * step_time;
+        let (turned, rate) = ease(self.lift_off.1, to, phase, 1.0 / self.rate);
         self.view.phase = phase;
         self.view.momentum = state.momentum;
-        self.view.wanted = self.pendulum.wanted(Vector2::new(self.velocity.x, self.velocity.y), support);
+        self.view.wanted = self.pendulum.wanted(velocity, support);
         self.view.foothold = foothold;
-        let way = self.swing(self.waypoint);
+        let mut way = self.swing(self.waypoint).at(phase);
+        let pace = self.rate * step_time;
+        way.velocity *= pace;
+        way.acceleration *= pace * pace;
         let mut carries = [false; 2];
         carries[support as usize] = true;
         Targets {
             support: carries,
             base: self.base(),
-            turn: self.velocity.turn,
+            turn,
             height: [contact.z + self.height, 0.0],
             shift: None,
-            swing: Some((swing, way.at(phase), [turned, rate])),
+            swing: Some((swing, way, [turned, rate])),
             swing_pitch: 0.0,
         }
     }

@@ -15,7 +15,7 @@ pub mod estimate;
 pub mod footsteps;
 pub mod gait;
 pub mod in_gait;
-pub mod odometry;
+pub mod offsets;
 pub mod plmk;
 pub mod settings;
 mod state;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use instep_robot::Robot;
 use instep_robot::control::{Controller, JointCommand, Sensors};
 
-use crate::odometry::Odometry;
+use crate::estimate::Estimator;
 use crate::whole_body::{Outcome, Targets};
 use crate::{Gait, StateEstimate, Velocity, WalkError, WalkSettings};
 
@@ -13,7 +13,7 @@ use crate::{Gait, StateEstimate, Velocity, WalkError, WalkSettings};
 #[derive(Debug)]
 pub struct Walker {
     gait: Gait,
-    odometry: Odometry,
+    estimator: Estimator,
     state: StateEstimate,
     /// The state of the next tick was told.
     told: bool,
@@ -37,7 +37,7 @@ impl Walker {
         Ok(Self {
             state: StateEstimate::standing(&robot),
             told: false,
-            odometry: Odometry::new(Arc::clone(&robot)),
+            estimator: Estimator::new(Arc::clone(&robot)),
             gait: Gait::new(robot, settings)?,
         })
     }
@@ -74,6 +74,12 @@ impl Walker {
         &self.state
     }
 
+    /// What estimates the state.
+    #[must_use]
+    pub fn estimator(&self) -> &Estimator {
+        &self.estimator
+    }
+
     /// The gait.
     #[must_use]
     pub fn gait(&self) -> &Gait {
@@ -84,7 +90,7 @@ impl Walker {
     /// [`Controller::tick`] calls all three.
     pub fn plan(&mut self, sensors: &Sensors) -> Targets {
         if !std::mem::take(&mut self.told) {
-            self.odometry.update(sensors, &mut self.state);
+            self.estimator.update(sensors, &mut self.state);
         }
         self.gait.plan(&self.state)
     }

@@ -1,5 +1,6 @@
 //! `instep bench`: KickBench. Engines x robots x scenarios x seeds to one table, on all cores, stopped and resumed at will.
 
+mod walk;
 mod worst;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -19,6 +20,9 @@ use crate::{files, places, worlds};
 /// The scenarios of a first look.
 const QUICK: [&str; 3] = ["straight", "match", "run-up"];
 
+/// The robots of KickBench unless some are named.
+const ROBOTS: &str = "nao,wolfgang,prestoe";
+
 /// The arguments of `instep bench`.
 #[derive(Debug, Args)]
 pub(crate) struct Bench {
@@ -26,8 +30,11 @@ pub(crate) struct Bench {
     #[arg(long, value_name = "ENGINE", value_delimiter = ',')]
     engine: Vec<String>,
     /// Robots, separated by commas
-    #[arg(long, value_name = "ROBOT", value_delimiter = ',', default_value = "nao,wolfgang,prestoe")]
+    #[arg(long, value_name = "ROBOT", value_delimiter = ',', default_value = ROBOTS)]
     robot: Vec<String>,
+    /// Measure walking instead of kicks; --robot is then all robots by default, --seeds 20
+    #[arg(long, conflicts_with_all = ["engine", "requests", "resume"])]
+    walk: bool,
     /// Scenarios by name, separated by commas [default: all that are in scenarios/]
     #[arg(long, value_name = "SCENARIO", value_delimiter = ',')]
     scenario: Vec<String>,
@@ -70,6 +77,9 @@ impl Bench {
     /// # Errors
     /// When a name is not known, a file cannot be used, or a simulation diverges.
     pub(crate) fn run(self, output: &Output) -> Result<ExitCode, Failure> {
+        if self.walk {
+            return self.run_walk(output);
+        }
         let bench = self.bench()?;
         let cells = bench.cells()?;
         if cells.is_empty() {
@@ -151,7 +161,7 @@ impl Bench {
         if !self.engine.is_empty() {
             command += &format!(" --engine {}", list(&self.engine));
         }
-        if list(&self.robot) != "nao,wolfgang,prestoe" {
+        if list(&self.robot) != ROBOTS {
             command += &format!(" --robot {}", list(&self.robot));
         }
         if !self.scenario.is_empty() {

@@ -5,8 +5,8 @@
 //! linear in xi whatever the state (their theorems 1 and 2); only the biases bring the state back in.
 //!
 //! Covariance is of a fixed size: a point that does not stand has zeros, and gets its block when it comes down (their
-//! section VI). Nothing is allocated. Yaw and place are not observable and drift. The filter is told which points stand; it does not
-//! find out by itself, and it does not throw slipping points out.
+//! section VI). Nothing is allocated. Yaw and place are not observable and drift. The filter is told which points stand and does not
+//! find out by itself; of those it throws out what has slipped.
 
 use nalgebra::{Const, Matrix3, MatrixViewMut, SMatrix, SVector, Vector3};
 
@@ -16,6 +16,9 @@ use super::group::{gamma, skew};
 pub const CONTACTS: usize = 4;
 /// Length of the error xi: R, v, p, d_i, gyro bias, accelerometer bias, three each.
 pub const ERROR: usize = 15 + 3 * CONTACTS;
+/// Squared Mahalanobis distance of an innovation from which its point has slipped: one in 10^6 of those that stand (chi-square
+/// with three degrees of freedom).
+const GATE: f64 = 30.0;
 /// First rows of the error's parts.
 const TURN: usize = 0;
 const VELOCITY: usize = 3;
@@ -169,11 +172,11 @@ impl ContactEkf {
     }
 
     /// Takes what the legs say of every contact point: those that stood and stand correct the state, new ones enter it, those
-    /// that left the ground leave it.
+    /// that left the ground leave it. A point whose place cannot be that of a standing one has slipped: it stands anew where it is.
     pub fn correct(&mut self, contacts: &[Contact; CONTACTS]) {
         for (i, contact) in contacts.iter().enumerate() {
             match (self.stands[i], contact.stands) {
-                (true, true) => self.correct_by(i, &contact.point),
+                (true, true) if !self.correct_by(i, &contact.point) => self.drop_point(i),
                 (true, false) => self.drop_point(i),
                 _ => {}
             }
@@ -187,7 +190,8 @@ impl ContactEkf {
     }
 
     /// Innovation R h - (d - p) = xi_p - xi_d + R noise; X <- exp(-K z) X (their eqs 20 to 22, with the signs of eta = X^ X^-1).
-    fn correct_by(&mut self, i: usize, point: &Vector3<f64>) {
+    /// Whether the point stood still: an innovation beyond [`GATE`] corrects nothing.
+    fn correct_by(&mut self, i: usize, point: &Vector3<f64>) -> bool {
         let at = POINTS + 3 * i;
         let innovation = self.rotation * point - (self.points[i] - self.position);
         let gain_base: SMatrix<f64, ERROR, 3> =
@@ -195,11 +199,15 @@ impl ContactEkf {
         let mut spread: Matrix3<f64> = gain_base.fixed_rows::<3>(POSITION) - gain_base.fixed_rows::<3>(at);
         spread += Matrix3::from_diagonal_element(self.noise.kinematics * self.noise.kinematics);
         // Positive definite by the encoders' noise; were that zero and all known, there would be nothing to correct.
-        let Some(inverse) = spread.try_inverse() else { return };
+        let Some(inverse) = spread.try_inverse() else { return true };
+        if innovation.dot(&(inverse * innovation)) > GATE {
+            return false;
+        }
         let gain = gain_base * inverse;
         self.covariance -= gain * gain_base.transpose();
         self.covariance = (self.covariance + self.covariance.transpose()) * 0.5;
         self.retract(&(gain * -innovation));
+        true
     }
 
     /// X <- exp(xi) X for the group's part, addition for the biases.
