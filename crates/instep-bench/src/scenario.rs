@@ -86,12 +86,27 @@ pub struct Kick {
     pub sweep: Option<usize>,
 }
 
-/// The kick of an engine that has its own start: its direction, its speed, nearly its ball.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+/// The kick of an engine that has its own start: its direction, its speed, nearly its ball; or other balls, taken in turn.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RunUp {
-    /// How far the ball lies from the engine's own place, in any direction, share of the leg length.
+    /// How far the ball lies from its place, in any direction, share of the leg length.
     pub shift: Range,
+    /// In place of the engine's own ball: balls that it is to walk up to.
+    #[serde(default)]
+    pub places: Vec<RunUpPlace>,
+    /// In place of the engine's own: speed of the ball as it leaves, m/s.
+    pub speed: Option<Range>,
+}
+
+/// A ball to be walked up to.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RunUpPlace {
+    /// Footprint frame of the start, m.
+    pub ball: [f64; 2],
+    /// Where it is to go, degrees from straight ahead to the left.
+    pub direction_deg: f64,
 }
 
 /// The ground; ranges of the fields of `instep_sim::settings::Pitch`.
@@ -241,7 +256,8 @@ impl Scenario {
             ("disturbance.rolling_from_deg", d.rolling_from_deg),
             ("ball.ahead", self.ball.ahead),
             ("ball.aside", self.ball.aside),
-            ("run_up.shift", self.run_up.map(|run_up| run_up.shift)),
+            ("run_up.shift", self.run_up.as_ref().map(|run_up| run_up.shift)),
+            ("run_up.speed", self.run_up.as_ref().and_then(|run_up| run_up.speed)),
         ];
         let (ball, kick) = (self.ball != BallPlace::default(), self.kick != Kick::default());
         let found = match (ball, kick, self.run_up.is_some()) {
@@ -308,17 +324,27 @@ impl Scenario {
     #[must_use]
     pub fn cases_about(&self, own: &KickRequest, size: &Size, seed: u64, count: usize) -> Vec<Case> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let [low, high] = self.run_up.map_or([0.0; 2], |run_up| run_up.shift);
+        let run_up = self.run_up.as_ref();
+        let [low, high] = run_up.map_or([0.0; 2], |run_up| run_up.shift);
         (0..count)
             .map(|i| {
                 let mut case = self.case(size, i, &mut rng);
                 let distance = (low + (high - low) * rng.random::<f64>()) * size.leg;
                 let angle = std::f64::consts::TAU * rng.random::<f64>();
+                let mut asked = *own;
+                if let Some(speed) = run_up.and_then(|run_up| run_up.speed) {
+                    let share: f64 = rng.random();
+                    asked.strength = Strength::BallSpeed(speed[0] + (speed[1] - speed[0]) * share);
+                }
+                if let Some(places) = run_up.map(|run_up| &run_up.places).filter(|places| !places.is_empty()) {
+                    let place = places[i % places.len()];
+                    (asked.ball, asked.direction) = (place.ball, place.direction_deg.to_radians());
+                }
                 // What noise does to the sight of the ball is in the request already.
                 let seen = [0, 1].map(|k| case.request.ball[k] - case.ball[k]);
-                case.ball = [own.ball[0] + distance * angle.cos(), own.ball[1] + distance * angle.sin()];
+                case.ball = [asked.ball[0] + distance * angle.cos(), asked.ball[1] + distance * angle.sin()];
                 let ball = [0, 1].map(|k| case.ball[k] + seen[k]);
-                case.request = KickRequest { ball, ..*own };
+                case.request = KickRequest { ball, ..asked };
                 (case.turn, case.side) = (0.0, 1.0);
                 case
             })

@@ -13,6 +13,7 @@ use instep_sim::settings::WorldSettings;
 use instep_sim::trial::has_fallen;
 use instep_sim::{BallState, World};
 use instep_walk::gait::{Counts, Footstep, Mode};
+use instep_walk::offsets::Offsets;
 use instep_walk::{Velocity, WalkSettings, Walker, approach};
 use nalgebra::{Quaternion, Rotation2, UnitQuaternion, Vector2, Vector3};
 
@@ -94,6 +95,8 @@ pub struct Walked {
     pub counts: Counts,
     /// Largest share of its torque limit of each joint, and of its speed limit.
     pub peaks: Vec<[f64; 2]>,
+    /// What the pendulum leaves out, as learned on the way.
+    pub offsets: Offsets,
     /// Steps that were made, odometry frame.
     pub footsteps: Vec<Footstep>,
     /// Samples.
@@ -319,6 +322,7 @@ impl Meter {
             real_time_factor: count as f64 * world.settings().step.tick / sum,
             counts: walker.gait().counts(),
             peaks: peaks.map(|(joint, peak)| [peak.torque / joint.torque, peak.speed / joint.speed]).collect(),
+            offsets: walker.gait().offsets(),
             footsteps: self.footsteps,
             record: self.record,
         }

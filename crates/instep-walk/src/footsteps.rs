@@ -145,20 +145,20 @@ pub struct Plan {
 }
 
 impl Pendulum {
-    /// The rate at which a step at `phase` goes on, and its foothold: nominal unless that is out of reach. `foothold` gives the wanted one
-    /// for the time that is left (s).
+    /// The rate at which a step goes on of which `ahead` is left of its phase, and its foothold: `nominal` (1/s) unless that is out of
+    /// reach. `foothold` gives the wanted one for the time that is left (s).
     pub fn time(
         &self,
-        phase: f64,
+        ahead: f64,
+        nominal: f64,
         reach: &Reach,
         foot: Side,
         mut foothold: impl FnMut(&Self, f64) -> Vector2<f64>,
     ) -> Plan {
-        let nominal = 1.0 / self.step_time;
         let to_momentum = self.lambda * (self.lambda * self.step_time).sinh() * self.lambda / crate::settings::GRAVITY;
         let mut judge = |power: i32| {
             let rate = nominal * STEP.powi(power);
-            let wanted = foothold(self, ((1.0 - phase) / rate).max(0.0));
+            let wanted = foothold(self, (ahead / rate).max(0.0));
             let step = reach.clip(wanted, foot);
             let haste = f64::from(power) * STEP.ln();
             ((wanted - step).norm_squared() * to_momentum.powi(2) + HASTE * haste * haste, Plan { rate, step })
@@ -182,7 +182,7 @@ mod tests {
         let reach = Reach { ahead: 0.65, across: [0.1, 0.55] };
         let plan = |momentum: f64| {
             let state = PendulumState { position: Vector2::new(0.0, 0.08), momentum: Vector2::new(0.0, momentum) };
-            pendulum.time(0.3, &reach, Side::Left, |pendulum, left| {
+            pendulum.time(0.7, 2.5, &reach, Side::Left, |pendulum, left| {
                 pendulum.foothold(&state, left, Vector2::zeros(), 0.0, Vector2::zeros(), Side::Left)
             })
         };

@@ -21,7 +21,7 @@ use crate::{StateEstimate, WalkError};
 
 /// How far the capture point may be from the middle of the feet when a gait ends, and how far before a standing robot steps:
 /// share of the half length of a foot, and share of half the distance across.
-const STOP: [f64; 2] = [0.5, 0.75];
+const STOP: [f64; 2] = [0.4, 0.75];
 /// See [`STOP`].
 const BALANCE: [f64; 2] = [0.9, 0.9];
 /// Farthest apart that the feet may be ahead when a gait ends, as a share of the height of the centre of mass.
@@ -33,7 +33,9 @@ const SPARE: f64 = 0.01;
 /// How soon the rate of a step follows what is wanted of it, s.
 const RATE_LAG: f64 = 0.02;
 /// A step whose rate is farther off the nominal one than this share was disturbed.
-const DISTURBED: f64 = 0.1;
+const DISTURBED: f64 = 0.25;
+/// How fast a standing body goes back over the middle of its feet, as a share of sqrt(g H): slower than what counts as a stop.
+const CREEP: f64 = 0.02;
 /// Fastest change of the height of the centre of mass that is asked, as a share of the height a second.
 const HEIGHT_RATE: f64 = 0.35;
 
@@ -113,6 +115,8 @@ pub struct Gait {
     data: RobotData,
     body: WholeBody,
     pendulum: Pendulum,
+    /// What is known of the pendulum beyond the state, odometry's axes.
+    disturbance: PendulumState,
     learner: Learner,
     mode: Mode,
     /// When the present mode or step began, s.
@@ -127,10 +131,14 @@ pub struct Gait {
     height: f64,
     asked: Velocity,
     velocity: Velocity,
+    /// Added to the velocity: what a body that does not walk as its model needs.
+    trim: Velocity,
     /// Where the swing foot left the ground, m, and its heading then, rad.
     lift_off: (Vector3<f64>, f64),
     /// Waypoint of the swing foot at phase 1/2, m, odometry frame, for the present step.
     waypoint: Option<Vector3<f64>>,
+    /// Where a standing body is led, from the middle of the feet, odometry's axes, m: first where it comes to rest by itself.
+    rest: Vector2<f64>,
     /// Centre of mass at the beginning of a shift from the middle of the feet, in the heading's axes, m.
     shift_from: Vector2<f64>,
     reference: JointCommand,
@@ -176,6 +184,7 @@ impl Gait {
             settings,
             data,
             body,
+            disturbance: PendulumState { position: Vector2::zeros(), momentum: Vector2::zeros() },
             learner: Learner::new(pendulum.lambda, pendulum.step_time),
             pendulum,
             mode: Mode::Stand,
@@ -187,8 +196,10 @@ impl Gait {
             heading: 0.0,
             asked: Velocity::default(),
             velocity: Velocity::default(),
+            trim: Velocity::default(),
             lift_off: (zero, 0.0),
             waypoint: None,
+            rest: Vector2::zeros(),
             shift_from: Vector2::zeros(),
             started: false,
             counts: Counts::default(),
@@ -252,7 +263,7 @@ impl Gait {
         if steps == 0 {
             return None;
         }
-        let left = ((1.0 - self.phase) / self.rate).max(0.0);
+        let left = self.left();
         let raw = self.pendulum_state(support, heading);
         let touchdown = self.learner.offsets.touchdown;
         let after = |x: f64| {
@@ -261,6 +272,17 @@ impl Gait {
         };
         let (still, slope) = (after(0.0), after(1.0) - after(0.0));
         (slope.abs() > 1e-6).then(|| (way - still) / slope)
+    }
+
+    /// From now on the pendulum is off the state by `disturbance`, in the odometry's axes: what a model that walks in place of the
+    /// robot does not show.
+    pub fn disturb(&mut self, disturbance: PendulumState) {
+        self.disturbance = disturbance;
+    }
+
+    /// From now on `trim` is added to the velocity.
+    pub fn set_trim(&mut self, trim: Velocity) {
+        self.trim = trim;
     }
 
     /// The present swing, as it would be led through `waypoint` (m, odometry frame).
@@ -309,7 +331,9 @@ impl Gait {
         self.counts.ticks += 1;
         self.approach(period);
         self.change(state);
-        self.heading += self.velocity.turn * period;
+        if matches!(self.mode, Mode::Step { .. }) {
+            self.heading += (self.velocity.turn + self.trim.turn) * period;
+        }
         self.view.heading = self.heading;
         let lowest = self.height - HEIGHT_RATE * self.settings.gait.height * period;
         self.height = self.settings.gait.height.max(lowest);
@@ -344,7 +368,16 @@ impl Gait {
             + arm.cross(&Vector3::new(momentum[0], momentum[1], momentum[2]));
         let scale = 1.0 / (self.robot.mass() * self.settings.gait.height);
         let turn = Rotation2::new(-heading);
-        PendulumState { position: turn * arm.xy(), momentum: turn * Vector2::new(about.y, -about.x) * scale }
+        PendulumState {
+            position: turn * (arm.xy() + self.disturbance.position),
+            momentum: turn * (Vector2::new(about.y, -about.x) * scale + self.disturbance.momentum),
+        }
+    }
+
+    /// Time until the swing foot is expected to come down, s.
+    fn left(&self) -> f64 {
+        let due = self.learner.offsets.step_time / self.settings.gait.step_time;
+        ((due - self.phase) / self.rate).max(0.0)
     }
 
     /// What the momentum of a gait ahead at `speed` (m/s) has beyond that of the pendulum, m/s.
@@ -375,6 +408,13 @@ impl Gait {
         } else {
             *now = Velocity::default();
         }
+    }
+
+    /// A standing body's rest creeps to the middle of the feet.
+    fn creep(&mut self) {
+        let way = CREEP * (GRAVITY * self.settings.gait.height).sqrt() * self.period;
+        let length = self.rest.norm();
+        self.rest *= if length > way { 1.0 - way / length } else { 0.0 };
     }
 
     /// Changes of the mode: start, touchdown, stop.
@@ -414,6 +454,7 @@ impl Gait {
                     self.learner.touch_down(&begins);
                     if self.may_stop() {
                         self.mode = Mode::Stand;
+                        self.rest = Rotation2::new(self.heading) * self.capture();
                         self.since = state.time;
                         self.waypoint = None;
                     } else {
@@ -474,6 +515,10 @@ impl Gait {
         let [left, right] = self.view.feet;
         let middle = 0.5 * (left + right);
         let mut shift = Waypoint { position: middle, velocity: Vector3::zeros(), acceleration: Vector3::zeros() };
+        if support.is_none() {
+            self.creep();
+            shift.position += Vector3::new(self.rest.x, self.rest.y, 0.0);
+        }
         if let Some(support) = support {
             let time = self.last_time - self.since;
             let outward = if support == Side::Left { 1.0 } else { -1.0 };
@@ -512,20 +557,22 @@ impl Gait {
         let step_time = gait.step_time;
         let reach = Reach { ahead: gait.reach, across: gait.across };
         let (swing, phase) = (support.other(), self.phase);
-        let velocity = Vector2::new(self.velocity.x, self.velocity.y);
+        let velocity = Vector2::new(self.velocity.x + self.trim.x, self.velocity.y + self.trim.y);
         self.pendulum.width = gait.width.max(velocity.y.abs() * step_time + reach.across[0] + SPARE);
         // A stop takes all momentum away at once.
         self.pendulum.alpha = if self.asked.is_zero() { 1.0 } else { gait.alpha };
-        let (turn, fed, touchdown) = (self.velocity.turn, self.fed(velocity.x), self.learner.offsets.touchdown);
+        let (turn, fed, touchdown) =
+            (self.velocity.turn + self.trim.turn, self.fed(velocity.x), self.learner.offsets.touchdown);
         // Frames turn: the foothold is chosen in the axes that the gait will have at the touchdown.
-        let left = ((1.0 - phase) / self.rate).max(0.0);
+        self.pendulum.step_time = self.learner.offsets.step_time;
+        let left = self.left();
         let heading = self.heading + turn * left;
         let raw = self.pendulum_state(support, heading);
         let state = self.learner.corrected(&raw, fed);
         let foothold =
             |pendulum: &Pendulum, left: f64| pendulum.foothold(&state, left, velocity, turn, touchdown, swing);
         if self.waypoint.is_none() {
-            let Plan { rate, .. } = self.pendulum.time(phase, &reach, swing, foothold);
+            let Plan { rate, .. } = self.pendulum.time(left * self.rate, 1.0 / step_time, &reach, swing, foothold);
             self.rate += (rate - self.rate) * (1.0 - (-self.period / RATE_LAG).exp());
         }
         if (self.rate * step_time - 1.0).abs() > DISTURBED {
@@ -562,20 +609,25 @@ impl Gait {
         }
     }
 
-    /// Last stage: torques, with a joint reference that is integrated from the accelerations and leaks to what is measured.
-    pub fn write(&mut self, state: &StateEstimate, outcome: Outcome, command: &mut JointCommand) {
-        let period = self.period;
+    /// Counts how a tick was solved.
+    pub(crate) fn count(&mut self, outcome: Outcome) {
         match outcome {
             Outcome::Solved => {}
             Outcome::Relaxed => self.counts.relaxed += 1,
-            Outcome::Unsolved => {
-                // The last torques, and the drives brake the joints where they are.
-                self.counts.unsolved += 1;
-                self.reference.velocities.fill(0.0);
-                command.velocities.fill(0.0);
-                command.positions.copy_from_slice(&state.q[7..]);
-                return;
-            }
+            Outcome::Unsolved => self.counts.unsolved += 1,
+        }
+    }
+
+    /// Last stage: torques, with a joint reference that is integrated from the accelerations and leaks to what is measured.
+    pub fn write(&mut self, state: &StateEstimate, outcome: Outcome, command: &mut JointCommand) {
+        let period = self.period;
+        self.count(outcome);
+        if outcome == Outcome::Unsolved {
+            // The last torques, and the drives brake the joints where they are.
+            self.reference.velocities.fill(0.0);
+            command.velocities.fill(0.0);
+            command.positions.copy_from_slice(&state.q[7..]);
+            return;
         }
         let share = 1.0 - (-self.settings.drive.leak * period).exp();
         for j in 0..self.robot.joints.len() {

@@ -19,7 +19,7 @@ use crate::{Velocity, WalkError, WalkSettings, Walker, approach};
 /// Poses that are kept, so that a sight finds where the robot was: ticks.
 const POSES: usize = 512;
 /// A sight older than this is not fresh, s.
-const FRESH: f64 = 0.3;
+const FRESH: f64 = 1.0;
 /// Variance of a sight at its own distance, (m, share of the distance), and growth of the ball's variance, m^2/s.
 const SIGHT: [f64; 2] = [0.01, 0.03];
 /// See [`SIGHT`].

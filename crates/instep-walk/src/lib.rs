@@ -17,6 +17,7 @@ pub mod gait;
 pub mod in_gait;
 pub mod offsets;
 pub mod plmk;
+pub mod servo;
 pub mod settings;
 mod state;
 pub mod swing;

@@ -8,6 +8,7 @@ use std::path::Path;
 
 use instep_motion::phase::Side;
 use instep_robot::Robot;
+use instep_robot::drive::DriveKind;
 use serde::{Deserialize, Serialize};
 
 use crate::WalkError;
@@ -161,6 +162,24 @@ pub struct Drive {
     /// How fast the integrated joint reference goes back to what is measured, 1/s. Smaller leans more on the drives' own
     /// stiffness, which makes up for friction.
     pub leak: f64,
+    /// How position servos are led.
+    pub servo: Servo,
+}
+
+/// How position servos are led; see [`crate::servo`].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Servo {
+    /// How far the ankles turn against a tilt of the trunk, rad/rad: stiffness beyond the servo's own, as a share of it.
+    pub tilt: f64,
+    /// See `tilt`; for its rate, s.
+    pub rate: f64,
+    /// Share of a tilt that the footholds react to.
+    pub foothold: f64,
+    /// Lag of the tilt that both see, s.
+    pub lag: f64,
+    /// Phase from which a foot that touches the ground ends the step.
+    pub earliest: f64,
 }
 
 impl WalkSettings {
@@ -198,6 +217,7 @@ impl WalkSettings {
                 "the left foot to the left of the right one, and [stand] a stand",
             );
         }
+        let is_servo = robot.drives.kind == DriveKind::PositionServo;
         let height = 0.91 * standing;
         let time = (height / GRAVITY).sqrt();
         // Gains are in units of the pendulum's time: 0.268 s for ARTEMIS.
@@ -205,7 +225,8 @@ impl WalkSettings {
         let task = |weight: f64, kp: f64, kd: f64| Task::new(weight, kp * rate.powi(2).min(2.0), kd * rate.min(1.4));
         Ok(Self {
             gait: Gait {
-                step_time: 1.49 * time,
+                // Servos are late: they want slower steps.
+                step_time: if is_servo { 2.0 } else { 1.49 } * time,
                 width: 1.1 * width,
                 height,
                 clearance: 0.1 * height,
@@ -245,7 +266,10 @@ impl WalkSettings {
                 look_ahead: 0.06,
                 torque_share: 1.0,
             },
-            drive: Drive { leak: 10.0 },
+            drive: Drive {
+                leak: 10.0,
+                servo: Servo { tilt: 0.5, rate: 0.6 * time, foothold: 0.0, lag: 0.01, earliest: 0.85 },
+            },
         })
     }
 
@@ -320,6 +344,11 @@ impl WalkSettings {
             ("limits.turn", limits.turn),
             ("control.moment", control.moment),
             ("drive.leak", self.drive.leak),
+            ("drive.servo.tilt", self.drive.servo.tilt),
+            ("drive.servo.rate", self.drive.servo.rate),
+            ("drive.servo.foothold", self.drive.servo.foothold),
+            ("drive.servo.lag", self.drive.servo.lag),
+            ("drive.servo.earliest", self.drive.servo.earliest),
         ] {
             check(field, value, value >= 0.0, "a number of at least 0")?;
         }

@@ -4,8 +4,10 @@ use std::sync::Arc;
 
 use instep_robot::Robot;
 use instep_robot::control::{Controller, JointCommand, Sensors};
+use instep_robot::drive::DriveKind;
 
 use crate::estimate::Estimator;
+use crate::servo::Model;
 use crate::whole_body::{Outcome, Targets};
 use crate::{Gait, StateEstimate, Velocity, WalkError, WalkSettings};
 
@@ -17,6 +19,8 @@ pub struct Walker {
     state: StateEstimate,
     /// The state of the next tick was told.
     told: bool,
+    /// What walks in place of a robot whose drives are position servos.
+    model: Option<Model>,
 }
 
 impl Walker {
@@ -34,9 +38,11 @@ impl Walker {
     /// # Errors
     /// When the robot has not what walking needs.
     pub fn new(robot: Arc<Robot>, settings: WalkSettings) -> Result<Self, WalkError> {
+        let is_servo = robot.drives.kind == DriveKind::PositionServo;
         Ok(Self {
             state: StateEstimate::standing(&robot),
             told: false,
+            model: is_servo.then(|| Model::new(Arc::clone(&robot), settings.drive.servo.clone())),
             estimator: Estimator::new(Arc::clone(&robot)),
             gait: Gait::new(robot, settings)?,
         })
@@ -92,7 +98,20 @@ impl Walker {
         if !std::mem::take(&mut self.told) {
             self.estimator.update(sensors, &mut self.state);
         }
-        self.gait.plan(&self.state)
+        let pose = self.odometry();
+        let Some(model) = &mut self.model else { return self.gait.plan(&self.state) };
+        let steps = model.sense(sensors, &self.state);
+        for _ in 1..steps {
+            model.prepare(&mut self.gait);
+            let targets = self.gait.plan(&model.state);
+            model.watch(&mut self.gait, pose);
+            let outcome = self.gait.solve(&targets);
+            model.integrate(&self.gait, outcome);
+        }
+        model.prepare(&mut self.gait);
+        let targets = self.gait.plan(&model.state);
+        model.watch(&mut self.gait, pose);
+        targets
     }
 
     /// Second stage: the whole-body controller.
@@ -102,7 +121,14 @@ impl Walker {
 
     /// Last stage: the command.
     pub fn write(&mut self, outcome: Outcome, command: &mut JointCommand) {
-        self.gait.write(&self.state, outcome, command);
+        match &mut self.model {
+            None => self.gait.write(&self.state, outcome, command),
+            Some(model) => {
+                model.integrate(&self.gait, outcome);
+                model.write(&self.gait, command);
+                self.gait.count(outcome);
+            }
+        }
     }
 
     /// The gait, to lead a swing foot.
