@@ -57,8 +57,8 @@ impl Bench {
         let text = table(&rows);
         let object = serde_json::json!({ "seeds": seeds.len(), "seed": self.seed, "rows": rows });
         let mut batch = files::Batch::default();
-        let write = |path: &std::path::Path, text: &str| {
-            std::fs::write(path, text)
+        let write = |path: std::path::PathBuf, text: &str| {
+            std::fs::write(&path, text)
                 .map_err(|e| Failure::input(format!("{}: cannot be written: {e}", path.display())))
         };
         let [markdown, json, html] = &files;
