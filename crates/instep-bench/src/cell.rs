@@ -70,6 +70,9 @@ pub struct Kicked {
     pub ball_speed: Option<f64>,
     /// Speed asked, m/s.
     pub asked_speed: f64,
+    /// Speed of the striking point just before the contact, m/s.
+    #[serde(default)]
+    pub foot_speed: Option<f64>,
     /// Signed direction error of a hit, rad.
     pub direction_error: Option<f64>,
     /// How far the ball of a hit rolls from its place, m, else 0: as simulated, and from the last speed on by the rolling
@@ -311,6 +314,7 @@ fn judge(subject: &Subject, case: &Case, trial: &Trial) -> Kicked {
         upright: trial.upright(),
         ball_speed,
         asked_speed,
+        foot_speed: trial.impact.as_ref().map(|impact| impact.foot_speed),
         direction_error,
         distance: if hit { distance } else { 0.0 },
         contact: trial.impact.as_ref().map(|impact| impact.time),

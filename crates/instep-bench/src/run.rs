@@ -39,10 +39,17 @@ impl Bench {
         for subject in &self.subjects {
             let mut engines = Vec::new();
             for engine in self.engines.iter().filter(|engine| subject.knows(engine)) {
-                engines.push((engine, subject.engine(engine)?.own_start().is_some()));
+                let own = subject.engine(engine)?.own_start();
+                // Only who stands at the start can walk up to another ball.
+                let walks_up = own.as_ref().is_some_and(|start| start.v.iter().all(|&v| v == 0.0));
+                engines.push((engine, own.is_some(), walks_up));
             }
             for scenario in &self.scenarios {
-                for &(engine, _) in engines.iter().filter(|(_, starts)| *starts == scenario.run_up.is_some()) {
+                let asks = |starts: bool, walks_up: bool| match &scenario.run_up {
+                    None => !starts,
+                    Some(run_up) => starts && (walks_up || run_up.is_near()),
+                };
+                for &(engine, ..) in engines.iter().filter(|(_, starts, walks_up)| asks(*starts, *walks_up)) {
                     for &seed in &self.seeds {
                         cells.push(CellKey {
                             engine: engine.clone(),

@@ -99,6 +99,14 @@ pub struct RunUp {
     pub speed: Option<Range>,
 }
 
+impl RunUp {
+    /// Whether it asks for the engine's own kick, nearly.
+    #[must_use]
+    pub fn is_near(&self) -> bool {
+        self.places.is_empty() && self.speed.is_none()
+    }
+}
+
 /// A ball to be walked up to.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

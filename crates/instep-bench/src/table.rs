@@ -46,10 +46,16 @@ pub struct Row {
     pub ball_speed_median: Option<f64>,
     /// Median of the audited ball speeds over the asked ones.
     pub speed_ratio_median: Option<f64>,
+    /// Median speed of the striking point just before the contact, m/s; and the least.
+    pub foot_speed_median: Option<f64>,
+    /// See `foot_speed_median`.
+    pub foot_speed_min: Option<f64>,
     /// Median of the absolute direction error of hits, deg.
     pub direction_error_median_deg: Option<f64>,
     /// 90th percentile of the same, deg.
     pub direction_error_p90_deg: Option<f64>,
+    /// The greatest, deg.
+    pub direction_error_max_deg: Option<f64>,
     /// Median distance that the ball rolls, m.
     pub distance_median: Option<f64>,
     /// Quartiles of the audited ball speeds over the asked ones.
@@ -176,8 +182,11 @@ fn row(cells: &[&CellResult], seed: SeedName) -> Row {
         ball_speed_median: of(|k| k.ball_speed, 0.5),
         speed_ratio_median: of(ratio, 0.5),
         speed_ratio_quartiles: [of(ratio, 0.25), of(ratio, 0.75)],
+        foot_speed_median: of(|k| k.foot_speed, 0.5),
+        foot_speed_min: of(|k| k.foot_speed, 0.0),
         direction_error_median_deg: of(error, 0.5),
         direction_error_p90_deg: of(error, 0.9),
+        direction_error_max_deg: of(error, 1.0),
         distance_median: of(|k| k.hit.then_some(k.distance), 0.5),
         contact_median_s: of(|k| k.contact, 0.5),
         plan_p50_s: plans(0.5),

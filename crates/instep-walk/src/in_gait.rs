@@ -247,6 +247,12 @@ impl InGait {
         }
     }
 
+    /// Where the ball is, as far as it is known: odometry's frame, m.
+    #[must_use]
+    pub fn ball(&self) -> Option<[f64; 2]> {
+        self.ball.map(|ball| ball.position.into())
+    }
+
     /// The settings.
     #[must_use]
     pub fn settings(&self) -> &InGaitSettings {

@@ -10,5 +10,7 @@
 #[path = "../rig/mod.rs"]
 mod rig;
 
+mod allocation;
 mod gait;
 mod in_gait;
+mod senses;
