@@ -13,7 +13,7 @@ use instep_robot::{Robot, RobotData};
 use nalgebra::{Rotation2, UnitQuaternion, Vector2, Vector3};
 
 use crate::footsteps::{Pendulum, PendulumState, Plan, Reach};
-use crate::offsets::Learner;
+use crate::offsets::{Learner, Offsets};
 use crate::settings::{GRAVITY, Velocity, WalkSettings};
 use crate::swing::{Swing, Waypoint};
 use crate::whole_body::{Outcome, Targets, WholeBody};
@@ -240,7 +240,7 @@ impl Gait {
 
     /// What the pendulum leaves out, as learned so far.
     #[must_use]
-    pub fn offsets(&self) -> crate::offsets::Offsets {
+    pub fn offsets(&self) -> Offsets {
         self.learner.offsets
     }
 
@@ -265,10 +265,11 @@ impl Gait {
         }
         let left = self.left();
         let raw = self.pendulum_state(support, heading);
-        let touchdown = self.learner.offsets.touchdown;
+        let Offsets { touchdown, speed, .. } = self.learner.offsets;
         let after = |x: f64| {
             let state = self.learner.corrected(&raw, self.fed(x));
-            self.pendulum.contact_after(&state, left, Vector2::new(x, 0.0), touchdown, support, steps).x
+            let velocity = Vector2::new(x, 0.0) + speed;
+            self.pendulum.contact_after(&state, left, velocity, touchdown, support, steps).x
         };
         let (still, slope) = (after(0.0), after(1.0) - after(0.0));
         (slope.abs() > 1e-6).then(|| (way - still) / slope)
@@ -450,8 +451,7 @@ impl Gait {
                     self.counts.steps += 1;
                     let position = self.view.feet[swing as usize];
                     self.footstep = Some(Footstep { time: state.time, side: swing, position, heading: self.heading });
-                    let begins = self.pendulum_state(swing, self.heading);
-                    self.learner.touch_down(&begins);
+                    self.learner.touch_down();
                     if self.may_stop() {
                         self.mode = Mode::Stand;
                         self.rest = Rotation2::new(self.heading) * self.capture();
@@ -580,8 +580,8 @@ impl Gait {
         }
         let step = reach.clip(foothold(&self.pendulum, left), swing);
         let end = self.pendulum.ahead(&state, left);
-        let planned = PendulumState { position: end.position - step, momentum: end.momentum };
-        self.learner.look(time, &raw, fed, planned);
+        let begins = PendulumState { position: end.position - step, momentum: end.momentum };
+        self.learner.look(time, heading, &raw, fed, &begins);
         let moved = Rotation2::new(heading) * step;
         let contact = self.view.feet[support as usize];
         let foothold = contact + Vector3::new(moved.x, moved.y, 0.0);
