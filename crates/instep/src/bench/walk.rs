@@ -6,7 +6,7 @@ use std::sync::Arc;
 use instep_bench::BenchError;
 use instep_bench::walk_bench::{self, WalkRow, scenarios, text_table};
 use instep_report::{Cell, Column, Report, SummaryItem, Table, Verdict};
-use instep_sim::settings::WorldSettings;
+use instep_sim::settings::{Fidelity, WorldSettings};
 
 use super::Bench;
 use crate::failure::Failure;
@@ -42,7 +42,8 @@ impl Bench {
             files::check_file(file)?;
         }
         let bar = output::bar((robots.len() * chosen.len() * seeds.len()) as u64, "{wide_bar} {pos}/{len} {msg} {eta}");
-        let rows = walk_bench::run(&robots, &chosen, &seeds, &WorldSettings::default(), &|robot, scenario| {
+        let world = WorldSettings { drives: Fidelity::AsBuilt, senses: Fidelity::AsBuilt, ..WorldSettings::default() };
+        let rows = walk_bench::run(&robots, &chosen, &seeds, &world, &|robot, scenario| {
             bar.inc(1);
             bar.set_message(format!("{robot} {scenario}"));
         })?;
@@ -104,7 +105,7 @@ fn page(rows: &[WalkRow], note: String) -> Report {
     };
     Report {
         title: "Walking bench".into(),
-        subtitle: "robots by scenarios, on their senses".into(),
+        subtitle: "robots by scenarios, with drives and senses as built".into(),
         summary: vec![
             SummaryItem::new("Walks", walks.to_string(), Verdict::Neutral, ""),
             SummaryItem::new("Upright", format!("{upright:.0}"), Verdict::Neutral, "of all walks"),
