@@ -11,6 +11,7 @@ fn kicked(distance: f64) -> Kicked {
         upright: true,
         ball_speed: Some(2.0 * distance),
         asked_speed: 1.0,
+        foot_speed: None,
         direction_error: Some(-0.1 * distance),
         distance,
         contact: Some(3.0 * distance),
