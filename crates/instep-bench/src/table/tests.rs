@@ -12,6 +12,7 @@ fn kicked(speed: f64, asked: f64, error_deg: f64) -> Kicked {
         upright: false,
         ball_speed: Some(speed),
         asked_speed: asked,
+        foot_speed: None,
         direction_error: Some(error_deg.to_radians()),
         distance: speed,
         contact: Some(speed),
