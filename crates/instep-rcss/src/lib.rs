@@ -30,4 +30,4 @@ pub use agent::Agent;
 pub use client::{Client, Setup, Tally};
 pub use error::RcssError;
 pub use settings::settings;
-pub use team::play;
+pub use team::{Roster, play};

@@ -11,8 +11,17 @@ use crate::agent::Agent;
 use crate::client::{Client, Setup, Tally};
 use crate::{RcssError, model};
 
-/// Lets `numbers` of `team` play in `robot` until `stop` is raised; `say` is told what people should know. When one cannot go on
-/// all stop.
+/// Who plays.
+#[derive(Debug, Clone, Copy)]
+pub struct Roster<'a> {
+    /// The team's name: letters, digits, `_` and `-`.
+    pub team: &'a str,
+    /// Shirt numbers, from 1 to 99.
+    pub numbers: &'a [u8],
+}
+
+/// Lets the `roster` play in `robot` until `stop` is raised; `say` is told what people should know. When one cannot go on all
+/// stop.
 ///
 /// # Errors
 /// The first that went wrong.
@@ -20,8 +29,7 @@ pub fn play(
     setup: &Setup,
     robot: &Robot,
     field: &Arc<Field>,
-    team: &str,
-    numbers: &[u8],
+    Roster { team, numbers }: Roster<'_>,
     settings: &PlayerSettings,
     stop: &AtomicBool,
     say: &(dyn Fn(String) + Sync),

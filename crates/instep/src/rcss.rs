@@ -7,7 +7,7 @@ use std::sync::Arc;
 use clap::Args;
 use instep_behaviour::{KickTable, Strategy};
 use instep_field::Field;
-use instep_rcss::{RcssError, Setup, Tally};
+use instep_rcss::{RcssError, Roster, Setup, Tally};
 use serde_json::json;
 
 use crate::failure::Failure;
@@ -91,9 +91,10 @@ impl Rcss {
             record: self.log.as_ref().map(|_| 0.1),
         };
         let stop = interrupt::stopped_by_the_user();
+        let roster = Roster { team: &self.team, numbers: &numbers };
         let say = |line: String| output.remark(|_| line);
-        let tallies = instep_rcss::play(&setup, &robot, &Arc::new(field), &self.team, &numbers, &settings, &stop, &say)
-            .map_err(failure)?;
+        let tallies =
+            instep_rcss::play(&setup, &robot, &Arc::new(field), roster, &settings, &stop, &say).map_err(failure)?;
         if let Some(log) = &self.log {
             let whole: Vec<_> =
                 tallies.iter().map(|tally| json!({ "number": tally.number, "records": tally.records })).collect();

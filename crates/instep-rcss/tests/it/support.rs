@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 
 use instep_behaviour::{KickTable, Strategy};
 use instep_field::Field;
-use instep_rcss::{RcssError, Setup, Tally};
+use instep_rcss::{RcssError, Roster, Setup, Tally};
 use instep_robot::Robot;
 
 /// The release whose protocol the crate was written for.
@@ -38,7 +38,7 @@ pub(crate) fn play(
     let field = Arc::new(Field::named("simulation").unwrap());
     let said = Mutex::new(Vec::new());
     let say = |line: String| said.lock().unwrap().push(line);
-    let result = instep_rcss::play(setup, &ROBOT, &field, team, numbers, &settings, stop, &say);
+    let result = instep_rcss::play(setup, &ROBOT, &field, Roster { team, numbers }, &settings, stop, &say);
     (result, said.into_inner().unwrap())
 }
 
@@ -90,6 +90,8 @@ impl Server {
         // It writes its console.log where it is started.
         let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("rcsssmj-{port}"));
         std::fs::create_dir_all(&folder).unwrap();
+        // A log of another time would tell of other players.
+        let _ = std::fs::remove_file(folder.join("console.log"));
         let [players, monitors] = [port, port + 1].map(|port| port.to_string());
         let child = Command::new(python())
             .args(["-m", "rcsssmj", "--no-render", "--sync", "--no-realtime"])
@@ -106,6 +108,17 @@ impl Server {
             std::thread::sleep(Duration::from_millis(100));
         }
         server
+    }
+
+    /// Waits until a player has joined and has had some cycles: its log says who comes.
+    pub(crate) fn joined(&self) {
+        let log = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("rcsssmj-{}", self.port)).join("console.log");
+        let begin = Instant::now();
+        while !std::fs::read_to_string(&log).unwrap_or_default().contains("activated") {
+            assert!(begin.elapsed().as_secs() < 90, "nobody joins at port {}", self.port);
+            std::thread::sleep(Duration::from_millis(100));
+        }
+        std::thread::sleep(Duration::from_secs(2));
     }
 
     /// Tells it what a monitor may tell.
