@@ -14,6 +14,7 @@
 //! One world a thread; but for the times that plans and ticks take the same cells give the same results on any number of threads. Engines see
 //! requests and sensors only.
 
+pub mod adopt;
 pub mod cell;
 pub mod cpu;
 pub mod directions;

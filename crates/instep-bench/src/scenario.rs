@@ -213,6 +213,26 @@ const ROOM: f64 = 0.005;
 /// Seconds of rolling that a moving ball's place is drawn for where the scenario says nothing.
 const ROLL_TIME: f64 = 1.5;
 
+impl Case {
+    /// `request` as it stands: the ball lies where it says, nothing disturbs, all noise is of `seed`.
+    #[must_use]
+    pub fn of(request: &KickRequest, seed: u64) -> Self {
+        Self {
+            request: *request,
+            ball: request.ball.map(|v| if v.is_finite() { v } else { 1.0 }),
+            ball_velocity: request.ball_velocity.map(|v| if v.is_finite() { v } else { 0.0 }),
+            pitch: [None; 2],
+            model: ModelError::default(),
+            push: None,
+            ball_moved: None,
+            turn: request.direction,
+            side: 1.0,
+            start: StartErrors { joint: 0.0, joint_speed: 0.0, base_speed: 0.0 },
+            seed,
+        }
+    }
+}
+
 impl Scenario {
     /// Reads and checks a scenario file.
     ///

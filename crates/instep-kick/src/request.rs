@@ -6,6 +6,7 @@
 
 use instep_motion::phase::Side;
 use instep_robot::Robot;
+use mujoco_rs::prelude::MjtObjBase;
 use serde::{Deserialize, Serialize};
 
 use crate::ball::BallModel;
@@ -355,6 +356,11 @@ impl Refusal {
                     "the robot is not in the pose from which this kick starts: {} is {off:.2} rad off",
                     name(*joint)
                 )
+            }
+            Self::SelfCollision { foot, gap, pair } => {
+                let part = |geom: usize| robot.model().id_to_name(MjtObjBase::mjOBJ_GEOM, geom).unwrap_or("?");
+                let [a, b] = robot.self_collision.get(*pair).map_or(["?"; 2], |pair| pair.map(part));
+                format!("with the {foot} foot {a} and {b} come within {gap:.3} m of each other")
             }
             other => other.to_string(),
         }

@@ -338,7 +338,8 @@ fn recording() -> Result<Recording, ReportError> {
         let t = f64::from(frame) / RATE;
         let s = stance(t);
         let position = [s.hip[0], s.knee[0], s.hip[1], s.knee[1]];
-        recording.joints(t, &Joints { names: &names, position: &position, velocity: &[], effort: &[] })?;
+        recording
+            .joints(t, &Joints { frame: "base", names: &names, position: &position, velocity: &[], effort: &[] })?;
         let poses: Vec<LinkPose<'_>> = links
             .iter()
             .zip(poses(t))

@@ -5,11 +5,11 @@
 //! searched for legs, feet and limits, and gets a starting `robot.toml` with everything that could be guessed.
 
 mod bare;
-mod legs;
-mod markup;
-mod outline;
+pub(crate) mod legs;
+pub(crate) mod markup;
+pub(crate) mod outline;
 mod plausible;
-mod suggest;
+pub(crate) mod suggest;
 
 use std::path::Path;
 

@@ -13,6 +13,14 @@ pub enum RobotError {
         /// What the system said.
         source: std::io::Error,
     },
+    /// A file cannot be written.
+    #[error("{}: cannot be written: {source}", file.display())]
+    Write {
+        /// The file.
+        file: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
     /// `robot.toml` is not TOML, or has a field that is missing, unknown or of another type.
     #[error("{}: {detail}", file.display())]
     Settings {

@@ -14,6 +14,7 @@
 //!
 //! Nothing here simulates: the world with its ball, contacts and noise is instep-sim.
 
+pub mod adopt;
 mod capsule;
 pub mod check;
 pub mod control;
@@ -26,6 +27,7 @@ mod names;
 mod robot;
 pub mod senses;
 pub mod settings;
+mod urdf;
 mod warnings;
 
 pub use capsule::{SegmentPair, closest_points};

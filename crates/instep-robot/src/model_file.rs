@@ -63,6 +63,32 @@ pub(crate) fn spec(file: &Path, model_file: &Path, settings: &RobotFile) -> Resu
         spec.compiler_mut().set_fusestatic(false);
         crate::meshes::resolve(&mut spec, model_file);
     }
+    complete(&mut spec, is_urdf, file, model_file, settings)?;
+    Ok(spec)
+}
+
+/// The same of an MJCF's text, which stands for `model_file`.
+pub(crate) fn spec_of_text(
+    file: &Path,
+    model_file: &Path,
+    text: &str,
+    settings: &RobotFile,
+) -> Result<MjSpec, RobotError> {
+    let refused = |detail: String| RobotError::Model { file: model_file.to_owned(), detail };
+    let mut spec = MjSpec::from_xml_string(text).map_err(|e| refused(e.to_string()))?;
+    complete(&mut spec, false, file, model_file, settings)?;
+    Ok(spec)
+}
+
+/// Makes a model a robot.
+fn complete(
+    spec: &mut MjSpec,
+    is_urdf: bool,
+    file: &Path,
+    model_file: &Path,
+    settings: &RobotFile,
+) -> Result<(), RobotError> {
+    let refused = |detail: String| RobotError::Model { file: model_file.to_owned(), detail };
     let wrong = |field: String, found: &str, expected: String| RobotError::Field {
         file: file.to_owned(),
         field,
@@ -109,5 +135,5 @@ pub(crate) fn spec(file: &Path, model_file: &Path, settings: &RobotFile) -> Resu
             .set_name(&contact.name)
             .map_err(|_| wrong(format!("contact[{i}].name"), &contact.name, "a name that no other geom has".into()))?;
     }
-    Ok(spec)
+    Ok(())
 }

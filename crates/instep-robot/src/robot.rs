@@ -14,7 +14,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::RobotError;
 use crate::drive::{DriveKind, DriveSettings, Pid};
-use crate::model_file::{sane, spec};
+use crate::model_file::{sane, spec, spec_of_text};
 use crate::names::{Names, drives, joint_index, joints, self_collision};
 use crate::senses::{Camera, SenseSettings};
 use crate::settings::{LegFile, PointFile, RobotFile};
@@ -130,6 +130,8 @@ pub struct Robot {
     pub drives: DriveSettings,
     /// How its senses err.
     pub senses: SenseSettings,
+    /// The engine that kicks where none is named.
+    pub engine: Option<String>,
     /// The camera that looks for the ball, where it has one.
     pub camera: Option<Camera>,
     /// MuJoCo body index of the base link.
@@ -168,15 +170,27 @@ impl Robot {
     pub fn load(path: &Path) -> Result<Self, RobotError> {
         let file = if path.is_dir() { path.join("robot.toml") } else { path.to_owned() };
         let text = std::fs::read_to_string(&file).map_err(|source| RobotError::Read { file: file.clone(), source })?;
-        let settings: RobotFile = toml::from_str(&text)
-            .map_err(|e| RobotError::Settings { file: file.clone(), detail: e.to_string().trim_end().to_owned() })?;
+        let settings = crate::settings::read(&file, &text)
+            .map_err(|detail| RobotError::Settings { file: file.clone(), detail })?;
         let model_file = file.parent().unwrap_or(Path::new(".")).join(&settings.model);
         Self::resolve(&file, model_file, settings)
     }
 
     pub(crate) fn resolve(file: &Path, model_file: PathBuf, settings: RobotFile) -> Result<Self, RobotError> {
         sane(file, &settings)?;
-        let mut spec = spec(file, &model_file, &settings)?;
+        let spec = spec(file, &model_file, &settings)?;
+        Self::of_spec(file, model_file, spec, settings)
+    }
+
+    /// The robot of an MJCF that is not on disk yet, which cannot be asked for its [`Robot::spec`].
+    pub(crate) fn resolve_text(file: &Path, model: &str, settings: RobotFile) -> Result<Self, RobotError> {
+        sane(file, &settings)?;
+        let model_file = PathBuf::from(&settings.model);
+        let spec = spec_of_text(file, &model_file, model, &settings)?;
+        Self::of_spec(file, model_file, spec, settings)
+    }
+
+    fn of_spec(file: &Path, model_file: PathBuf, mut spec: MjSpec, settings: RobotFile) -> Result<Self, RobotError> {
         let model =
             spec.compile().map_err(|e| RobotError::Model { file: model_file.clone(), detail: e.to_string() })?;
         let names = Names { file, model: &model };
@@ -257,6 +271,7 @@ impl Robot {
 
         let mut robot = Self {
             senses: settings.senses.clone(),
+            engine: settings.engine.clone(),
             camera: None,
             name: settings.name.clone(),
             title: settings.title.clone(),
@@ -293,6 +308,12 @@ impl Robot {
         data.set_position(&robot.stand);
         robot.stand[2] -= robot.contacts.iter().map(|c| data.point(&c.at).z - c.radius).fold(f64::INFINITY, f64::min);
         Ok(robot)
+    }
+
+    /// What it is called on pages for people: its title up to the first comma.
+    #[must_use]
+    pub fn display_name(&self) -> &str {
+        self.title.split(',').next().map(str::trim).filter(|name| !name.is_empty()).unwrap_or(&self.name)
     }
 
     /// The compiled model: the robot alone, with gravity, without a ground.

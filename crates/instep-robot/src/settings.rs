@@ -2,8 +2,10 @@
 //! and gains that a model file cannot say. Read by [`crate::Robot::load`], which checks every name against the model.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 
 use serde::{Deserialize, Serialize};
+use toml::{Table, Value};
 
 use crate::drive::{DriveSettings, Pid};
 use crate::senses::SenseSettings;
@@ -18,6 +20,9 @@ pub struct RobotFile {
     pub title: String,
     /// Model file (MJCF or URDF), relative to this file.
     pub model: String,
+    /// The engine that kicks where none is named; see `instep bench` for their names.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub engine: Option<String>,
     /// The floating base.
     pub base: BaseFile,
     /// What its drives take, how often and how late; absent, torque drives at 1 kHz without delay.
@@ -163,4 +168,68 @@ pub struct PointFile {
     pub link: String,
     /// The point in the link's frame, m.
     pub point: [f64; 3],
+}
+
+/// The text of a `robot.toml`, laid over the file that its key `derived` names, if it has one.
+///
+/// Tables are laid over tables, named elements of a list (`group`, `contact`) over those of the same name; all else takes the place of what
+/// was derived.
+///
+/// # Errors
+/// In words: when either file is no TOML, or the derived one cannot be read.
+pub(crate) fn read(file: &Path, text: &str) -> Result<RobotFile, String> {
+    let plain = |e: toml::de::Error| e.to_string().trim_end().to_owned();
+    let mut own: Table = toml::from_str(text).map_err(plain)?;
+    let Some(derived) = own.remove("derived") else { return toml::from_str(text).map_err(plain) };
+    let Some(name) = derived.as_str() else {
+        return Err(format!("derived: {derived}; expected the name of a file beside this one"));
+    };
+    let beside = file.parent().unwrap_or(Path::new(".")).join(name);
+    let base =
+        std::fs::read_to_string(&beside).map_err(|e| format!("derived: {}: cannot be read: {e}", beside.display()))?;
+    let mut table: Table = toml::from_str(&base).map_err(|e| format!("derived: {}: {}", beside.display(), plain(e)))?;
+    lay_over(&mut table, own);
+    RobotFile::deserialize(Value::Table(table)).map_err(|e| format!("with {name}: {}", plain(e)))
+}
+
+fn lay_over(table: &mut Table, over: Table) {
+    for (key, value) in over {
+        match (table.get_mut(&key), value) {
+            (Some(Value::Table(inner)), Value::Table(value)) => lay_over(inner, value),
+            (Some(Value::Array(items)), Value::Array(values)) if values.iter().all(|v| v.get("name").is_some()) => {
+                for value in values {
+                    let same = items.iter_mut().find(|item| item.get("name") == value.get("name"));
+                    match (same, value) {
+                        (Some(Value::Table(inner)), Value::Table(value)) => lay_over(inner, value),
+                        (_, value) => items.push(value),
+                    }
+                }
+            }
+            (_, value) => {
+                table.insert(key, value);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_stands_in_the_file_goes_before_what_was_derived() {
+        let mut derived: Table =
+            toml::from_str("stand = {a = 1.0}\n[[group]]\nname = 'x'\nkp = 1.0\n[[group]]\nname = 'y'\nkp = 2.0\n")
+                .unwrap();
+        let own = toml::from_str(
+            "stand = {b = 2.0}\ngroup = [{name = 'y', speed = 3.0}, {name = 'z'}]\npairs = [['a', 'b']]",
+        )
+        .unwrap();
+        lay_over(&mut derived, own);
+        let expected: Table = toml::from_str(
+            "stand = {a = 1.0, b = 2.0}\ngroup = [{name = 'x', kp = 1.0}, {name = 'y', kp = 2.0, speed = 3.0}, {name = 'z'}]\npairs = [['a', 'b']]",
+        )
+        .unwrap();
+        assert_eq!(derived, expected);
+    }
 }

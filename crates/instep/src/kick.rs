@@ -13,8 +13,9 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use clap::Args;
-use instep_kick::policy::{PERIOD, PolicyKick};
-use instep_kick::{KickPlan, KickRequest, Playback, Strength};
+use instep_bench::Subject;
+use instep_kick::policy::{PERIOD, PolicyKick, PolicySettings};
+use instep_kick::{KickPlan, KickRequest, Playback, Settings, Strength};
 use instep_motion::phase::Side;
 use instep_motion::reference::{Reference, ReferenceKind};
 use instep_robot::Robot;
@@ -34,6 +35,8 @@ use crate::{files, places, worlds};
 const AFTERMATH: f64 = 1.2;
 /// The longest trial, s.
 const LONGEST: f64 = 120.0;
+/// The engine that follows from any robot.
+const FOLLOWS: &str = "dynamic";
 /// The robot that kicks when nothing says which.
 const ROBOT: &str = "prestoe";
 
@@ -49,7 +52,7 @@ pub(crate) struct Kick {
     /// The robot: a name, or the path of its folder or robot.toml [default: the reference's or policy's, else prestoe]
     #[arg(long, value_name = "ROBOT")]
     robot: Option<String>,
-    /// Where the ball lies, in metres: x along the kick, y to its left [default: the reference's ball]
+    /// Where the ball lies, in metres: x along the kick, y to its left [default: the reference's ball; on request, before a foot]
     #[arg(long, value_name = "X,Y", allow_hyphen_values = true, value_parser = point)]
     ball: Option<[f64; 2]>,
     /// Where in the reference to start, in seconds [default: where the support foot is planted; for a policy, its start]
@@ -64,22 +67,25 @@ pub(crate) struct Kick {
     /// Folder for report.html and kick.mcap
     #[arg(long, value_name = "FOLDER", default_value = "out/kick")]
     out: PathBuf,
-    /// Kick on request with this engine, as `instep bench` names them, in place of playing a reference
+    /// Kick on request with this engine, as `instep bench` names them [default: the robot's own, where robot.toml names one]
     #[arg(long, value_name = "ENGINE", conflicts_with_all = ["reference", "start", "duration"])]
     engine: Option<String>,
-    /// With --engine: direction of the ball, in degrees from straight ahead to the left [default: 0, or the engine's only one]
-    #[arg(long, value_name = "ANGLE", allow_hyphen_values = true, value_parser = degrees, requires = "engine")]
+    /// Of a kick on request: direction of the ball, in degrees from straight ahead to the left [default: 0, or the engine's only one]
+    #[arg(long, value_name = "ANGLE", allow_hyphen_values = true, value_parser = degrees)]
     direction: Option<f64>,
-    /// With --engine: speed of the ball, in m/s [default: 1, or the engine's only one]
-    #[arg(long, value_name = "SPEED", allow_negative_numbers = true, requires = "engine")]
+    /// Of a kick on request: speed of the ball, in m/s [default: 1, or the engine's only one]
+    #[arg(long, value_name = "SPEED", allow_negative_numbers = true)]
     speed: Option<f64>,
-    /// With --engine: a file of requests (a JSON array, or one JSON object a line) in place of --ball; writes no report
-    #[arg(long, value_name = "FILE", requires = "engine", conflicts_with_all = ["ball", "direction", "speed"])]
+    /// A file of requests (a JSON array, or one JSON object a line) in place of --ball; writes no report
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["ball", "direction", "speed"])]
     requests: Option<PathBuf>,
     /// Also writes model.mjb, steps.json and steps.f64 into this folder: every physics step of one kick, which tools/replay.py
     /// does again in MuJoCo's own Python
     #[arg(long, value_name = "FOLDER", conflicts_with = "requests")]
     steps: Option<PathBuf>,
+    /// Also write the kick as a small picture that moves (SVG)
+    #[arg(long, value_name = "FILE.svg", conflicts_with = "requests")]
+    picture: Option<PathBuf>,
     /// The world: "ideal" for perfect drives and senses, or a TOML file; what is absent in it keeps its default
     #[arg(long, value_name = "FILE")]
     world: Option<PathBuf>,
@@ -115,6 +121,8 @@ pub(crate) struct Tried {
     pub(crate) trial: Trial,
     pub(crate) report: PathBuf,
     pub(crate) recording: PathBuf,
+    /// The small picture, where one was asked for.
+    pub(crate) picture: Option<PathBuf>,
 }
 
 /// What a kick came from.
@@ -141,8 +149,19 @@ impl Kick {
     /// # Errors
     /// When something handed in cannot be used or the simulation diverges. How the kick went is no error.
     pub(crate) fn run(self, output: &Output) -> Result<ExitCode, Failure> {
-        if let Some(name) = &self.engine {
-            return self.on_request(name, output);
+        if let Some((subject, engine)) = self.asks()? {
+            return self.on_request(&subject, &engine, output);
+        }
+        let alone = [
+            ("--direction", self.direction.is_some()),
+            ("--speed", self.speed.is_some()),
+            ("--requests", self.requests.is_some()),
+        ];
+        if let Some((flag, _)) = alone.into_iter().find(|(_, given)| *given) {
+            let message = format!(
+                "{flag}: says what an engine is asked for, and none kicks here; expected --engine ENGINE beside it"
+            );
+            return Err(Failure::input(message));
         }
         let (ready, policy) = match &self.reference {
             Some(file) => (self.with_playback(file)?, None),
@@ -163,7 +182,7 @@ impl Kick {
             return Err(Failure::input(message));
         }
         let (report, recording) = (self.out.join("report.html"), self.out.join("kick.mcap"));
-        for file in [&report, &recording] {
+        for file in [&report, &recording].into_iter().chain(&self.picture) {
             files::check_file(file)?;
         }
 
@@ -189,7 +208,8 @@ impl Kick {
         let followed = Arc::new(Followed { reference, file: reference_file, policy, start });
         let source = Source::Followed(Arc::clone(&followed));
         let world_changes = world.changes(&default);
-        let tried = Tried { robot, source, settings, world_changes, trial, report, recording };
+        let picture = self.picture.clone();
+        let tried = Tried { robot, source, settings, world_changes, trial, report, recording, picture };
         tried.write()?;
         output.show(&Measures::new(&tried, &followed), |paint| summary::text(&tried, paint))?;
         Ok(ExitCode::SUCCESS)
@@ -244,35 +264,60 @@ impl Kick {
         Ok(Ready { robot, reference, reference_file, start, period: PERIOD, controller: Box::new(engine), twin, q, v })
     }
 
-    /// Kicks on request.
-    fn on_request(&self, engine: &str, output: &Output) -> Result<ExitCode, Failure> {
+    /// The robot and the engine that is to kick on request: the one named, else the robot's own, else `dynamic`, which follows from any
+    /// robot; `None` where a reference or a policy is to be played.
+    fn asks(&self) -> Result<Option<(Subject, String)>, Failure> {
+        let played =
+            self.reference.is_some() || self.policy.is_some() || self.start.is_some() || self.duration.is_some();
         let Some(robot) = self.robot.as_deref() else {
-            return Err(Failure::input("--robot: which robot is to kick? such as --robot wolfgang"));
+            return match &self.engine {
+                Some(_) => Err(Failure::input("--robot: which robot is to kick? such as --robot wolfgang")),
+                None => Ok(None),
+            };
         };
-        let subject = instep_bench::Subject::of(places::robot(robot)?)?;
+        if self.engine.is_none() && played {
+            return Ok(None);
+        }
+        let robot = places::robot(robot)?;
+        let has_policy = robot.folder().join(PolicySettings::FILE).exists();
+        let own = robot.engine.clone().or_else(|| (!has_policy).then(|| FOLLOWS.to_owned()));
+        let Some(engine) = self.engine.clone().or(own) else { return Ok(None) };
+        Ok(Some((Subject::of(robot)?, engine)))
+    }
+
+    /// Kicks on request.
+    fn on_request(&self, subject: &Subject, engine: &str, output: &Output) -> Result<ExitCode, Failure> {
         let requests = match (&self.requests, self.ball) {
             (Some(file), _) => engine::load(file)?,
-            (None, ball) => vec![self.request(ball, subject.engine(engine)?.own_start().map(|start| start.request))?],
+            (None, ball) => {
+                let own = subject.engine(engine)?.own_start().map(|start| start.request);
+                vec![self.request(ball.unwrap_or_else(|| before_a_foot(subject)), ball.is_some(), own)]
+            }
         };
         let world = worlds::asked(self.world.as_deref(), &subject.default_world())?;
-        let folders = engine::Folders { out: &self.out, steps: self.steps.as_deref() };
-        let subject = subject.in_world(world);
+        let folders =
+            engine::Folders { out: &self.out, steps: self.steps.as_deref(), picture: self.picture.as_deref() };
+        let subject = subject.clone().in_world(world);
         engine::run(&subject, engine, &requests, world, self.seed, folders, output)
     }
 }
 
+/// Where a ball lies that nobody placed: straight before the right foot, a tenth of a leg off its toes, m.
+fn before_a_foot(subject: &Subject) -> [f64; 2] {
+    let size = &subject.size;
+    [size.toes + 0.1 * size.leg + size.ball, -size.half_width]
+}
+
 impl Kick {
     /// The request of the command line; what it does not say is the engine's `own`, where that has only one.
-    fn request(&self, ball: Option<[f64; 2]>, own: Option<KickRequest>) -> Result<KickRequest, Failure> {
-        let mut request = match (own, ball) {
-            (Some(own), _) => own,
-            (None, Some(ball)) => KickRequest::new(ball, 0.0, 1.0),
-            (None, None) => return Err(Failure::input("--ball: where is the ball? such as --ball 0.2,-0.05")),
-        };
-        request.ball = ball.unwrap_or(request.ball);
+    fn request(&self, ball: [f64; 2], placed: bool, own: Option<KickRequest>) -> KickRequest {
+        let mut request = own.unwrap_or_else(|| KickRequest::new(ball, 0.0, 1.0));
+        if placed {
+            request.ball = ball;
+        }
         request.direction = self.direction.unwrap_or(request.direction);
         request.strength = self.speed.map_or(request.strength, Strength::BallSpeed);
-        Ok(request)
+        request
     }
 }
 
@@ -281,6 +326,11 @@ impl Tried {
     fn write(&self) -> Result<(), Failure> {
         let mut batch = files::Batch::default();
         page(self).save(batch.stage(&self.report)?)?;
+        if let Some(file) = &self.picture {
+            let staged = batch.stage(file)?;
+            std::fs::write(&staged, page::picture(self))
+                .map_err(|e| Failure::input(format!("{}: cannot be written: {e}", file.display())))?;
+        }
         recording::recording(self)?.save(batch.stage(&self.recording)?)?;
         batch.commit()
     }

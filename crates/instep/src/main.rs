@@ -5,6 +5,7 @@
 //! it and the best so far is written; 2, something handed in cannot be used: one message on standard error says what and what would be
 //! right, and nothing was written.
 
+mod adopt;
 mod bench;
 mod decide;
 mod eval;
@@ -26,6 +27,7 @@ mod retarget;
 mod robot;
 mod ros;
 mod see;
+mod show;
 mod train;
 mod tune;
 mod walk;

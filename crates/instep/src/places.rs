@@ -1,5 +1,6 @@
 //! Where robots and references are found: in the folder the user stands in, beside or above the program, and last in
-//! the workspace that the program was built from.
+//! the workspace that the program was built from. Robots are looked for first in the folder that the environment's
+//! `INSTEP_ROBOTS` names.
 
 use std::path::{Path, PathBuf};
 
@@ -95,10 +96,17 @@ pub(crate) fn scenarios() -> Result<PathBuf, Failure> {
         .ok_or_else(|| Failure::input("scenarios/: no such folder; run from the project's folder"))
 }
 
+/// The folder of robots that the user's environment names.
+fn robots_of_user() -> Option<PathBuf> {
+    std::env::var_os("INSTEP_ROBOTS").filter(|folder| !folder.is_empty()).map(PathBuf::from)
+}
+
 /// The `robot.toml` of the robot called `name`, if that is a plain name and there is one.
 fn shipped(name: &Path) -> Option<PathBuf> {
     let is_name = name.components().count() == 1 && name.file_name().is_some();
-    if is_name { find(&Path::new("robots").join(name).join("robot.toml")) } else { None }
+    let file = name.join("robot.toml");
+    let of_user = || robots_of_user().map(|folder| folder.join(&file)).filter(|file| file.is_file());
+    if is_name { of_user().or_else(|| find(&Path::new("robots").join(&file))) } else { None }
 }
 
 /// The files of a robot that the user wants looked at: a path, or the name of a robot that can be found.
@@ -160,13 +168,15 @@ pub(crate) fn strategy(flag: &str, path: &Path) -> Result<PathBuf, Failure> {
 
 /// Names of the robots that can be found.
 fn robots() -> Vec<String> {
-    let mut names: Vec<String> = roots()
-        .iter()
-        .filter_map(|root| std::fs::read_dir(root.join("robots")).ok())
+    let mut names: Vec<String> = robots_of_user()
+        .into_iter()
+        .chain(roots().into_iter().map(|root| root.join("robots")))
+        .filter_map(|folder| std::fs::read_dir(folder).ok())
         .flatten()
         .flatten()
         .filter(|entry| entry.path().join("robot.toml").is_file())
         .map(|entry| entry.file_name().to_string_lossy().into_owned())
+        .filter(|name| !name.starts_with('.'))
         .collect();
     names.sort_unstable();
     names.dedup();

@@ -8,7 +8,7 @@ use instep_robot::check::{self, CheckReport, Finding, Kind};
 
 use crate::failure::Failure;
 use crate::output::{Output, Paint};
-use crate::{places, reach};
+use crate::{adopt, places, reach, show};
 
 /// The subcommands of `instep robot`.
 #[derive(Debug, Subcommand)]
@@ -18,6 +18,10 @@ pub(crate) enum RobotCommand {
         /// A robot's folder, its robot.toml, or a bare model (MJCF or URDF)
         path: PathBuf,
     },
+    /// Make a robot's folder of a bare model, ready to kick: legs, soles, drives, stand and engines are derived, and tried
+    Adopt(adopt::Adopt),
+    /// Show which of a robot's numbers stand in a file and which follow from others
+    Show(show::Show),
     /// Measure which places the kicking foot can reach, by moving the simulated robot through them
     Reach(reach::Reach),
 }
@@ -30,6 +34,8 @@ impl RobotCommand {
     pub(crate) fn run(self, output: &Output) -> Result<ExitCode, Failure> {
         let path = match self {
             Self::Check { path } => path,
+            Self::Adopt(adopt) => return adopt.run(output),
+            Self::Show(show) => return show.run(output),
             Self::Reach(reach) => return reach.run(output),
         };
         let path = places::robot_files(&path)?;

@@ -2,11 +2,12 @@
 //!
 //! | topic | type | frame |
 //! |---|---|---|
-//! | `/joint_states` | `sensor_msgs/msg/JointState` | – |
+//! | `/joint_states` | `sensor_msgs/msg/JointState` | the base link |
 //! | `/tf` | `tf2_msgs/msg/TFMessage` | `world` to each link |
 //! | `/ball` | `geometry_msgs/msg/PoseStamped` | `world` |
 //! | `/imu` | `sensor_msgs/msg/Imu` | the sensor's link |
 //! | `/events` | `std_msgs/msg/String` | – |
+//! | `/robot_description` | `std_msgs/msg/String`: a URDF, once | its links are the frames of `/tf` |
 //!
 //! Every stamp is the time of the trial, never the clock of this machine: the same trial gives the same bytes. The file
 //! is built in memory (a few hundred bytes a frame) and written in one step.
@@ -22,7 +23,7 @@ use serde::Serialize;
 
 use crate::{ReportError, file};
 use messages as msg;
-use schemas::{BALL, EVENTS, IMU, JOINT_STATES, TF, Topic};
+use schemas::{BALL, DESCRIPTION, EVENTS, IMU, JOINT_STATES, TF, Topic};
 
 /// The frame that `/tf` and `/ball` are given in.
 pub const WORLD: &str = "world";
@@ -33,6 +34,8 @@ const CDR_LITTLE_ENDIAN: [u8; 4] = [0x00, 0x01, 0x00, 0x00];
 /// The joints at one instant. The four lists run side by side; `velocity` and `effort` may be empty (unknown).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Joints<'a> {
+    /// The frame that the joints hang on: the base link.
+    pub frame: &'a str,
     /// Joint names.
     pub names: &'a [String],
     /// Angles, rad.
@@ -115,7 +118,7 @@ impl Recording {
             }
         }
         let message = msg::JointState {
-            header: msg::Header::new(&JOINT_STATES, time, "")?,
+            header: msg::Header::new(&JOINT_STATES, time, joints.frame)?,
             name: joints.names,
             position: joints.position,
             velocity: joints.velocity,
@@ -181,6 +184,14 @@ impl Recording {
     /// [`ReportError::Time`] for an impossible time.
     pub fn event(&mut self, time: f64, label: &str) -> Result<(), ReportError> {
         self.write(&EVENTS, time, &msg::StringMessage { data: label })
+    }
+
+    /// Says what the robot looks like, as a URDF: at time 0, for a viewer to draw at the frames of `/tf`.
+    ///
+    /// # Errors
+    /// [`ReportError::Encode`] where it cannot be written as a message.
+    pub fn description(&mut self, urdf: &str) -> Result<(), ReportError> {
+        self.write(&DESCRIPTION, 0.0, &msg::StringMessage { data: urdf })
     }
 
     /// The whole file.

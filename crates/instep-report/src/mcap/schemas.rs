@@ -64,6 +64,9 @@ pub(super) const IMU: Topic = Topic {
 pub(super) const EVENTS: Topic =
     Topic { name: "/events", message: "std_msgs/msg/String", fields: "string data\n", needs: &[] };
 
+pub(super) const DESCRIPTION: Topic =
+    Topic { name: "/robot_description", message: "std_msgs/msg/String", fields: "string data\n", needs: &[] };
+
 impl Topic {
     /// The definition with everything it needs, as readers want it: parts divided by a line of 80 equals signs.
     pub(super) fn definition(&self) -> String {

@@ -35,6 +35,7 @@ fn recording() -> Recording {
     for frame in 0..50 {
         let time = f64::from(frame) * 0.01;
         let joints = Joints {
+            frame: "torso",
             names: &names,
             position: &[time, -time],
             velocity: &[1.0, -1.0],
@@ -56,6 +57,7 @@ fn recording() -> Recording {
         recording.imu(time, &imu).unwrap();
     }
     recording.event(0.25, "impact").unwrap();
+    recording.description("<robot name=\"r\"/>").unwrap();
     recording
 }
 
@@ -63,7 +65,7 @@ fn recording() -> Recording {
 fn messages_read_back() {
     let bytes = recording().finish().unwrap();
     let messages: Vec<_> = ::mcap::MessageStream::new(&bytes).unwrap().map(Result::unwrap).collect();
-    assert_eq!(messages.len(), 4 * 50 + 1);
+    assert_eq!(messages.len(), 4 * 50 + 2);
     for message in &messages {
         assert_eq!(message.channel.message_encoding, "cdr");
         assert_eq!(message.channel.schema.as_ref().unwrap().encoding, "ros2msg");
@@ -76,11 +78,14 @@ fn messages_read_back() {
         cdr_encoding::from_bytes::<T, LittleEndian>(&message.data[4..]).unwrap().0
     }
 
+    let description = on(&messages, "/robot_description");
+    assert_eq!((description.len(), description[0].log_time), (1, 0));
+    assert_eq!(decode::<String>(description[0]), "<robot name=\"r\"/>");
     let joints = on(&messages, "/joint_states");
     assert_eq!(joints[7].log_time, 70_000_000);
     assert_eq!(joints[7].sequence, 7);
     let wanted = JointState {
-        header: Header { sec: 0, nanosec: 70_000_000, frame_id: String::new() },
+        header: Header { sec: 0, nanosec: 70_000_000, frame_id: "torso".into() },
         name: vec!["knee".into(), "ankle".into()],
         position: vec![0.07, -0.07],
         velocity: vec![1.0, -1.0],
@@ -112,8 +117,9 @@ fn same_input_gives_same_bytes() {
 fn refused_messages_say_why() {
     let mut recording = Recording::new().unwrap();
     let names = vec!["knee".to_owned()];
-    let error =
-        recording.joints(0.5, &Joints { names: &names, position: &[], velocity: &[], effort: &[] }).unwrap_err();
+    let error = recording
+        .joints(0.5, &Joints { frame: "torso", names: &names, position: &[], velocity: &[], effort: &[] })
+        .unwrap_err();
     assert_eq!(error.to_string(), "/joint_states at 0.5 s: position has 0 values; wanted 1, one for each joint");
     let error = recording.event(f64::NAN, "never").unwrap_err();
     assert!(matches!(error, ReportError::Time { topic: "/events", .. }), "{error}");

@@ -3,7 +3,7 @@
 //! A scanner of start and end tags with their attributes, not an XML parser: MuJoCo has judged the file already, or
 //! will. Comments and declarations are skipped; whatever cannot be read as a tag is passed over.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// One start tag with its attributes, or one end tag.
 #[derive(Debug, PartialEq)]
@@ -28,6 +28,8 @@ pub(crate) struct Markup {
     pub(crate) name: Option<String>,
     /// Speed limit of each joint, rad/s, where the file gives one above zero (URDF `limit velocity`).
     pub(crate) speeds: BTreeMap<String, f64>,
+    /// Joints that follow another (URDF `mimic`).
+    pub(crate) followers: BTreeSet<String>,
     /// Files of meshes.
     pub(crate) meshes: Vec<String>,
     /// Folder of the meshes (MJCF `compiler meshdir` or `assetdir`).
@@ -60,6 +62,7 @@ pub(crate) fn read(text: &str) -> Markup {
                     markup.speeds.insert(joint.to_owned(), speed);
                 }
             }
+            "mimic" => markup.followers.extend(joint.map(str::to_owned)),
             "mesh" => {
                 let file = tag.attribute("filename").or_else(|| tag.attribute("file"));
                 if let Some(file) = file.filter(|file| !markup.meshes.iter().any(|known| known == file)) {

@@ -160,12 +160,12 @@ impl Outline {
 }
 
 /// MuJoCo's indices are never negative where we ask.
-fn index(id: i32) -> usize {
+pub(crate) fn index(id: i32) -> usize {
     usize::try_from(id).unwrap_or(0)
 }
 
 /// The largest torque that each joint's own actuator can give, N m, where the model limits it.
-fn actuator_torques(model: &MjModel) -> Vec<Option<f64>> {
+pub(crate) fn actuator_torques(model: &MjModel) -> Vec<Option<f64>> {
     let mut torques = vec![None; model.jnt_type().len()];
     for a in 0..model.actuator_trnid().len() {
         if !matches!(model.actuator_trntype()[a], MjtTrn::mjTRN_JOINT | MjtTrn::mjTRN_JOINTINPARENT) {

@@ -58,6 +58,7 @@ pub(crate) fn suggest(outline: &Outline, markup: &Markup, limbs: &Limbs, model: 
         title: format!("{name}, {} joints, {:.3} kg", outline.joints.len(), outline.model.totalmass()),
         name,
         model: model.file_name().map_or_else(|| UNKNOWN.into(), |file| file.to_string_lossy().into_owned()),
+        engine: None,
         base: BaseFile { link: known(outline.base.map_or("", |base| outline.link_name(base))), imu: [0.0; 3] },
         drives: crate::drive::DriveSettings::default(),
         senses: crate::senses::SenseSettings::default(),
@@ -235,7 +236,7 @@ fn groups(
 }
 
 /// Landmarks that follow from legs and arms.
-fn landmarks(
+pub(crate) fn landmarks(
     outline: &Outline,
     limbs: &Limbs,
     legs: Option<&[LegRoles; 2]>,

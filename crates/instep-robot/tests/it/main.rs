@@ -7,6 +7,7 @@
     reason = "helpers of tests may fail a test and print its figures"
 )]
 
+mod adopt;
 mod check;
 mod control;
 mod differences;

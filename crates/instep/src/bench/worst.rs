@@ -93,5 +93,6 @@ fn tried(key: &CellKey, ran: Ran, page: &Path, subject: &Subject) -> Tried {
         trial,
         report: page.to_owned(),
         recording: page.to_owned(),
+        picture: None,
     }
 }

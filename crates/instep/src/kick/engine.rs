@@ -10,8 +10,7 @@ use instep_kick::KickRequest;
 use instep_motion::text;
 use instep_sim::World;
 use instep_sim::audit::{Audit, Rerun};
-use instep_sim::settings::{Change, ModelError, WorldSettings};
-use instep_sim::start::StartErrors;
+use instep_sim::settings::{Change, WorldSettings};
 use serde::Serialize;
 
 use super::{Source, Tried, steps, summary};
@@ -53,6 +52,8 @@ pub(super) struct Folders<'a> {
     pub(super) out: &'a Path,
     /// Physics steps.
     pub(super) steps: Option<&'a Path>,
+    /// The small picture.
+    pub(super) picture: Option<&'a Path>,
 }
 
 /// Runs `requests` one after the other, each from where the engine starts; a single one is shown in a report under `out`, and its
@@ -69,10 +70,10 @@ pub(super) fn run(
     folders: Folders,
     output: &Output,
 ) -> Result<ExitCode, Failure> {
-    let Folders { out, steps: kept } = folders;
+    let Folders { out, steps: kept, picture } = folders;
     let (report, recording) = (out.join("report.html"), out.join("kick.mcap"));
     if requests.len() == 1 {
-        for file in [&report, &recording] {
+        for file in [report.as_path(), &recording].into_iter().chain(picture) {
             files::check_file(file)?;
         }
     }
@@ -84,19 +85,7 @@ pub(super) fn run(
     let mut answers = Vec::with_capacity(requests.len());
     let mut shown = None;
     for request in requests {
-        let case = Case {
-            request: *request,
-            ball: request.ball.map(|v| if v.is_finite() { v } else { 1.0 }),
-            ball_velocity: request.ball_velocity.map(|v| if v.is_finite() { v } else { 0.0 }),
-            pitch: [None; 2],
-            model: ModelError::default(),
-            push: None,
-            ball_moved: None,
-            turn: request.direction,
-            side: 1.0,
-            start: StartErrors { joint: 0.0, joint_speed: 0.0, base_speed: 0.0 },
-            seed,
-        };
+        let case = Case::of(request, seed);
         let (outcome, plan_s, ran) = run_case(subject, engine, &case, &mut world, &mut Vec::new())?;
         let refused = outcome.as_ref().err().map(|r| Refused { cause: r.name(), message: r.explain(&subject.robot) });
         let kicked = outcome.ok();
@@ -127,7 +116,8 @@ pub(super) fn run(
         if let (Some(Ran { plan, settings, trial, .. }), (Some(report), Some(recording))) = (ran, files) {
             let source = Source::Asked { engine: engine.to_owned(), request: *request, plan };
             let (robot, world_changes) = (subject.robot.clone(), world_changes.clone());
-            let tried = Tried { robot, source, settings, world_changes, trial, report, recording };
+            let picture = picture.map(Path::to_owned);
+            let tried = Tried { robot, source, settings, world_changes, trial, report, recording, picture };
             tried.write()?;
             shown = Some(tried);
         }

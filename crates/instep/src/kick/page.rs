@@ -3,8 +3,8 @@
 use instep_motion::phase::Side;
 use instep_motion::reference::Knot;
 use instep_report::{
-    Arrow, ArrowFrame, Cell, Color, Column, Event, Limit, Pitch, Plot, Region, Replay, Report, Series, SummaryItem,
-    Table, Verdict,
+    Arrow, ArrowFrame, Cell, Color, Column, Event, Limit, Picture, Pitch, Plot, Region, Replay, Report, Series,
+    SummaryItem, Table, Verdict,
 };
 use instep_robot::{LinkPoint, Robot};
 use nalgebra::Vector3;
@@ -19,7 +19,7 @@ const CLOSE: f64 = 0.03;
 
 /// The whole page.
 pub(crate) fn page(tried: &Tried) -> Report {
-    let (trial, name) = (&tried.trial, figure::capital(&tried.robot.name));
+    let (trial, name) = (&tried.trial, tried.robot.display_name());
     let title = match &trial.impact {
         Some(_) if trial.audit.is_valid() => format!("{name} kicks at {:.2} m/s", trial.ball_speed.unwrap_or(0.0)),
         Some(_) => format!("{name} kicks, but it is not to be believed"),
@@ -180,6 +180,19 @@ fn frames(tried: &Tried) -> Vec<usize> {
         wanted
     };
     (0..times.len()).filter(shown).collect()
+}
+
+/// Seconds before and after the impact that the small picture shows.
+const SHOWN: [f64; 2] = [1.0, 0.35];
+
+/// The kick as a small picture that moves.
+pub(super) fn picture(tried: &Tried) -> String {
+    let times = &tried.trial.record.times;
+    let end = times.last().copied().unwrap_or(0.0);
+    let middle = tried.trial.impact.as_ref().map_or(end, |impact| impact.time);
+    let span = [(middle - SHOWN[0]).max(0.0), (middle + SHOWN[1]).min(end)];
+    let azimuth = -std::f64::consts::FRAC_PI_2 + 0.5;
+    Picture { azimuth, elevation: 0.12, size: [420.0, 320.0], rate: 20.0, span }.svg(&replay(tried))
 }
 
 fn replay(tried: &Tried) -> Replay {

@@ -15,6 +15,8 @@ pub(super) fn recording(tried: &Tried) -> Result<Recording, ReportError> {
     let links = 1..robot.model().body_parentid().len();
     let mut data = robot.data();
     let mut recording = Recording::new()?;
+    recording.description(&robot.urdf())?;
+    let frame = robot.link_name(robot.base);
     // Messages go in by time, as a reader will want them.
     let mut events = super::summary::events(&tried.trial).into_iter().peekable();
     for (i, &time) in record.times.iter().enumerate() {
@@ -23,7 +25,7 @@ pub(super) fn recording(tried: &Tried) -> Result<Recording, ReportError> {
         }
         let (q, v) = (record.row(&record.q, i), record.row(&record.v, i));
         let effort = record.row(&record.torques, i);
-        recording.joints(time, &Joints { names: &names, position: &q[7..], velocity: &v[6..], effort })?;
+        recording.joints(time, &Joints { frame, names: &names, position: &q[7..], velocity: &v[6..], effort })?;
         data.set_position(q);
         let poses: Vec<LinkPose<'_>> = links
             .clone()

@@ -113,8 +113,8 @@ pub(super) fn page(done: &Done, k: &Kinodynamic) -> Report {
     Report {
         matrix: None,
         title: match k.status.feasible() {
-            true => format!("{clip} as {} can do it", figure::capital(&done.robot.name)),
-            false => format!("{clip}: not what {} can do", figure::capital(&done.robot.name)),
+            true => format!("{clip} as {} can do it", done.robot.display_name()),
+            false => format!("{clip}: not what {} can do", done.robot.display_name()),
         },
         subtitle: format!("{} \u{b7} {} \u{b7} time scale {}", done.stage(), done.robot.title, k.time_scale),
         summary: items(k),

@@ -34,7 +34,7 @@ fn kinematic(done: &Done) -> Report {
     let times: Vec<f64> = (0..r.positions.len()).map(|frame| done.clip.time(frame)).collect();
     Report {
         matrix: None,
-        title: format!("{clip} on {}", done.robot.name),
+        title: format!("{clip} on {}", done.robot.display_name()),
         subtitle: format!("{} \u{b7} {}", done.stage(), done.robot.title),
         summary: items(done),
         tables: tables(done, &mut data),

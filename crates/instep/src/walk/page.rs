@@ -18,7 +18,7 @@ const FRAMES: usize = 1800;
 const BARS: [f64; 3] = [0.05, 0.03, 1.0];
 
 pub(super) fn page(made: &Made) -> Report {
-    let (walked, name) = (&made.walked, figure::capital(&made.robot.name));
+    let (walked, name) = (&made.walked, made.robot.display_name());
     let title = match (walked.fell_at, made.task.asked) {
         (Some(time), _) => format!("{name} falls after {time:.1} s"),
         (None, Asked::Goal([x, y, _])) => format!("{name} walks to ({x:.1}, {y:.1}) m"),

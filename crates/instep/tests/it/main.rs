@@ -8,6 +8,7 @@
 )]
 
 mod bad_input;
+mod docs;
 mod engine;
 mod kick;
 mod learn;
