@@ -127,7 +127,7 @@ impl Player {
         let limits = RobotLimits {
             forward: share * walk.limits.forward,
             backward: share * walk.limits.backward,
-            sideways: share * walk.limits.sideways,
+            sideways: tuning.side_share * walk.limits.sideways,
             turn: share * walk.limits.turn,
             acceleration: walk.limits.acceleration,
             turn_acceleration: walk.limits.turn_acceleration,

@@ -71,6 +71,8 @@ pub struct Tuning {
     pub mate_forgotten: f64,
     /// Share of what the walk allows that is asked of it: the rest corrects.
     pub walk_share: f64,
+    /// The same for side steps: fast ones on top of a fast walk are what a biped falls over.
+    pub side_share: f64,
     /// From a change of the asked velocity to its effect, s.
     pub walk_delay: f64,
     /// Time constant with which the velocity follows, s.
@@ -95,6 +97,7 @@ impl Default for Tuning {
             say: 0.5,
             mate_forgotten: 4.0,
             walk_share: 0.8,
+            side_share: 0.8,
             walk_delay: 0.1,
             walk_lag: 0.4,
             radius: 0.3,
@@ -188,6 +191,7 @@ impl Tuning {
             ("say", self.say, 0.0, 60.0),
             ("mate_forgotten", self.mate_forgotten, 0.1, 60.0),
             ("walk_share", self.walk_share, 0.05, 1.0),
+            ("side_share", self.side_share, 0.05, 1.0),
             ("walk_delay", self.walk_delay, 0.0, 1.0),
             ("walk_lag", self.walk_lag, 0.0, 3.0),
             ("radius", self.radius, 0.05, 2.0),

@@ -206,7 +206,8 @@ impl PhysicsMatch {
         let ball_before = self.ball;
         let mut touches: Touches = self.arena.on_ball.iter().copied().collect();
         let contacts: ArrayVec<(usize, usize), 64> = self.arena.met.clone();
-        (self.arena.on_ball.clear(), self.arena.met.clear());
+        self.arena.on_ball.clear();
+        self.arena.met.clear();
         let field = Arc::clone(&self.settings.field);
         let playing = self.referee.state == PlayState::Playing;
         let mut whereabouts = self.ball.whereabouts(&field);
