@@ -16,8 +16,8 @@ use crate::framing::{Inbox, TooLong, frame};
 use crate::model::CYCLE;
 use crate::{RcssError, agent};
 
-/// A server that says nothing for this long is dead.
-const SILENCE: Duration = Duration::from_secs(10);
+/// A server that says nothing for this long is dead; on a busy machine it is silent while it takes others in.
+const SILENCE: Duration = Duration::from_secs(30);
 /// But this long while it takes a player in: it builds its whole world anew.
 const PATIENT: Duration = Duration::from_secs(60);
 /// How often a stop is looked for while nothing comes.
@@ -138,7 +138,7 @@ impl<'a> Client<'a> {
                     if joined && !std::mem::replace(&mut told, true) {
                         (self.say)(format!("{}: {detail}; player {} tries again", self.address(), self.tally.number));
                     }
-                    std::thread::sleep(if begin.elapsed() < SILENCE { PAUSES[0] } else { PAUSES[1] });
+                    std::thread::sleep(if begin.elapsed() < CONNECT { PAUSES[0] } else { PAUSES[1] });
                     continue;
                 }
             };
