@@ -5,8 +5,8 @@ use instep_match::Recording;
 use instep_match::physics::Motion;
 use instep_match::physics::fig12h::Outcome;
 use instep_report::{
-    Actor, Cell, Color, Column, Event, Finish, Marking, Part, Pitch, Pose, Replay, Report, Shape, SummaryItem, Table,
-    Verdict,
+    Actor, Camera, Cell, Color, Column, Event, Finish, Marking, Part, Pitch, Pose, Replay, Report, Shape, SummaryItem,
+    Table, Verdict,
 };
 use instep_robot::Robot;
 
@@ -15,6 +15,9 @@ use crate::figure::{self, Figure};
 
 /// Frames of the replay at most.
 const FRAMES: usize = 1500;
+/// The view at the start: most of the field.
+const FROM_THE_SIDE: Camera =
+    Camera { target: [0.0, 0.0, 0.4], distance: 9.0, azimuth: -std::f32::consts::FRAC_PI_2, elevation: 0.5 };
 /// Radius of goal posts, m.
 const POST: f32 = instep_sim::goal::POST_RADIUS as f32;
 const TEAMS: [&str; 2] = ["Red", "Blue"];
@@ -67,7 +70,7 @@ fn replay(scene: &Scene<'_>, motion: &Motion) -> Replay {
     let mut data = scene.robot.data();
     let nq = scene.robot.nq();
     let radius = scene.field.ball.radius;
-    let mut actors = vec![figure::ball(radius, frames.iter().map(|&i| motion.ball[i]))];
+    let mut actors = Vec::new();
     let mut numbers = [0; 2];
     for (rows, &team) in motion.q.iter().zip(&scene.teams) {
         numbers[team] += 1;
@@ -75,6 +78,7 @@ fn replay(scene: &Scene<'_>, motion: &Motion) -> Replay {
         let positions = frames.iter().map(|&i| &rows[i * nq..(i + 1) * nq]);
         actors.push(figure.actor(&name, &mut data, positions, |color| mix(color, COLORS[team])));
     }
+    actors.push(figure::ball(radius, frames.iter().map(|&i| motion.ball[i])));
     actors.push(beliefs(scene, &times));
     actors.push(goals(scene.field));
     let last = times.last().copied().unwrap_or(0.0);
@@ -82,7 +86,7 @@ fn replay(scene: &Scene<'_>, motion: &Motion) -> Replay {
         scene.events.iter().map(|(time, label)| Event { time: *time, label: label.clone() }).collect();
     events.retain(|event| event.time <= last);
     events.sort_by(|a, b| a.time.total_cmp(&b.time));
-    Replay { times, actors, events, pitch: Some(pitch(scene.field)), camera: None }
+    Replay { times, actors, events, pitch: Some(pitch(scene.field)), camera: Some(FROM_THE_SIDE) }
 }
 
 /// Half of the robot's own colour, half of its team's.
