@@ -43,12 +43,8 @@ pub(super) enum Part {
 /// Fills in what the model does not say of its joints; gives what is asked of a person.
 pub(super) fn fill_in(skeleton: &mut Skeleton, parts: &[Option<Part>], servos: bool) -> Vec<String> {
     let mass = skeleton.mass();
-    let (mut torques, mut guessed, mut tabled, mut rotors): (
-        Vec<String>,
-        Vec<String>,
-        BTreeMap<&str, Vec<String>>,
-        Vec<String>,
-    ) = Default::default();
+    let (mut torques, mut guessed, mut rotors) = (Vec::new(), Vec::new(), Vec::new());
+    let mut tabled: BTreeMap<&str, Vec<String>> = BTreeMap::new();
     for (link, part) in skeleton.links.iter_mut().zip(parts) {
         let Some(hinge) = &mut link.hinge else { continue };
         let given = hinge.torque.is_some();
