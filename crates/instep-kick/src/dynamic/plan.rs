@@ -24,6 +24,9 @@ use crate::whole_body::torque::Dynamics;
 
 /// The share of the asked speed below which a slower stroke is no answer.
 const SLOWEST: f64 = 0.88;
+/// Wind-ups, in units of the one that there is room for, and speeds, in units of the asked one, in the order in which they are
+/// tried.
+const TRIES: [(f64, f64); 7] = [(1.0, 1.0), (1.5, 1.0), (0.7, 1.0), (2.0, 1.0), (1.0, 0.89), (1.5, 0.89), (2.0, 0.89)];
 /// Way over which the joints' speeds at the contact are taken, m.
 const WAY: f64 = 0.01;
 /// Share of the speed limit up to which a stroke is left as the settings have it.
@@ -79,6 +82,25 @@ struct Candidate {
     /// Lower is better.
     cost: f64,
     ball_speed: f64,
+    /// The stroke's speed as a share of the one that the request asks.
+    slower: f64,
+}
+
+impl Candidate {
+    /// What is planned with it.
+    fn planned(&self, settings: &DynamicSettings, motion: Motion) -> Planned {
+        let front = self.stroke.face == Face::Front;
+        let plan = KickPlan {
+            foot: self.stroke.swing,
+            face: self.stroke.face,
+            contact: motion.contact.unwrap_or(0.0),
+            duration: motion.timeline.end(),
+            foot_speed: self.stroke.speed,
+            ball_speed: self.ball_speed,
+            precision: if front { settings.accuracy.front } else { settings.accuracy.side },
+        };
+        Planned { motion, stroke: self.stroke, plan }
+    }
 }
 
 /// A motion that was forecast to be possible.
@@ -171,34 +193,37 @@ impl Planner {
         }
         // The two best are enough: what neither can do, the sixth will not.
         for candidate in candidates.iter().flatten() {
-            let motion = motion::kick(body, settings, &candidate.stroke);
-            let demands = Demands {
-                limits: &settings.limits,
-                foot_speed: candidate.stroke.speed,
-                calm: [[1.0; 2], [LATE; 2]],
-                roll: ROLL,
-                ground: GROUND,
-            };
-            let forecast = if whole {
-                self.rehearsal.forecast(body, &motion, &demands).map_err(|(cause, _)| cause)
-            } else {
-                Ok(())
-            };
-            match forecast {
-                Ok(()) => {
-                    let front = candidate.stroke.face == Face::Front;
-                    let plan = KickPlan {
-                        foot: candidate.stroke.swing,
-                        face: candidate.stroke.face,
-                        contact: motion.contact.unwrap_or(0.0),
-                        duration: motion.timeline.end(),
-                        foot_speed: candidate.stroke.speed,
-                        ball_speed: candidate.ball_speed,
-                        precision: if front { settings.accuracy.front } else { settings.accuracy.side },
-                    };
-                    return Ok(Planned { motion, stroke: candidate.stroke, plan });
+            if !whole {
+                let motion = motion::kick(body, settings, &candidate.stroke);
+                return Ok(candidate.planned(settings, motion));
+            }
+            // What is too fast for the motors over one way may be possible over another, or a little slower.
+            for (windup, slower) in TRIES {
+                let mut tried = *candidate;
+                if candidate.slower * slower < SLOWEST {
+                    continue;
                 }
-                Err(cause) => refusal = Some(graver(refusal, cause)),
+                tried.stroke.windup *= windup;
+                tried.stroke.speed *= slower;
+                tried.ball_speed *= slower;
+                let motion = motion::kick(body, settings, &tried.stroke);
+                let demands = Demands {
+                    limits: &settings.limits,
+                    foot_speed: tried.stroke.speed,
+                    calm: [[1.0; 2], [LATE; 2]],
+                    roll: ROLL,
+                    ground: GROUND,
+                };
+                match self.rehearsal.forecast(body, &motion, &demands) {
+                    Ok(()) => return Ok(tried.planned(settings, motion)),
+                    Err((cause, _)) => {
+                        let other = matches!(cause, Refusal::TooFast { .. } | Refusal::OffBalance { .. });
+                        refusal = Some(graver(refusal, cause));
+                        if !other {
+                            break;
+                        }
+                    }
+                }
             }
         }
         Err(refusal.unwrap_or(Refusal::Unreachable { foot: Side::Right, place: Place::Contact, gap: f64::INFINITY }))
@@ -323,7 +348,7 @@ impl Planner {
         let mut cost = aim.cost + ease.0 / settings.limits.speed;
         cost += 0.8 * (1.0 - stroke.windup / s.windup) + 0.3 * (1.0 - stroke.follow / s.follow);
         cost += 0.3 * (1.0 - limit / 0.1).clamp(0.0, 1.0);
-        Ok(Candidate { stroke, cost, ball_speed: ball_speed * slower })
+        Ok(Candidate { stroke, cost, ball_speed: ball_speed * slower, slower })
     }
 
     /// Chooses how the foot pitches and rises at the contact so that the joints' speeds are easiest, for a stroke whose contact
