@@ -4,6 +4,7 @@
 mod adaptive;
 mod follow;
 mod gaze;
+mod servo;
 
 use std::path::{Path, PathBuf};
 
