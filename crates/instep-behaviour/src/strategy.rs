@@ -96,7 +96,7 @@ impl Default for Strategy {
     fn default() -> Self {
         Self {
             name: "default".to_owned(),
-            description: "Shoots where a goal is likely, else plays the ball forward into free room".to_owned(),
+            description: "Shoots whenever the goal is before it, stays close behind the ball with a second player, and lets the keeper come out".to_owned(),
             weights: Weights::default(),
             shot: ShotSettings::default(),
             roles: RoleSettings::default(),
@@ -108,32 +108,32 @@ impl Default for Strategy {
 impl Default for Weights {
     fn default() -> Self {
         Self {
-            area: 0.3,
-            goal_angle: 1.0,
-            goal_distance: 3.0,
-            own_distance: 0.3,
-            team_distance: 0.3,
-            opponent_distance: 0.5,
-            block: 1.0,
+            area: 0.31,
+            goal_angle: 0.26,
+            goal_distance: 3.78,
+            own_distance: 0.66,
+            team_distance: 0.08,
+            opponent_distance: 0.64,
+            block: 1.15,
         }
     }
 }
 
 impl Default for ShotSettings {
     fn default() -> Self {
-        Self { least_chance: 0.25, opponent_reach: 0.15, spread_factor: 1.0, most_turn: 2.0 }
+        Self { least_chance: 0.0, opponent_reach: 0.15, spread_factor: 1.0, most_turn: 1.58 }
     }
 }
 
 impl Default for RoleSettings {
     fn default() -> Self {
-        Self { keeper: true, hysteresis: 1.0, dwell: 1.0, defender_first: false, keeper_clears: 2.5 }
+        Self { keeper: true, hysteresis: 0.37, dwell: 0.5, defender_first: true, keeper_clears: 3.65 }
     }
 }
 
 impl Default for Positions {
     fn default() -> Self {
-        Self { keeper_out: 0.5, defender_share: 0.5, support_ahead: 1.5, support_beside: 1.5, restart_margin: 0.3 }
+        Self { keeper_out: 0.95, defender_share: 0.76, support_ahead: 0.12, support_beside: 1.84, restart_margin: 0.3 }
     }
 }
 
