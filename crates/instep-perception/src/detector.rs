@@ -47,6 +47,11 @@ impl Detector {
         Ok(Self::new(file::read(path, &[])?.0))
     }
 
+    /// Its parameters, in the order of [`shape::parts`].
+    pub fn weights(&self) -> &[f32] {
+        &self.weights
+    }
+
     /// All peaks above `threshold`, the most confident first.
     ///
     /// # Errors

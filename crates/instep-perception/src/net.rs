@@ -1,6 +1,8 @@
-//! The detector's network: kernels ([`conv`]), shape ([`shape`]), file ([`file`]).
+//! The detector's network: kernels ([`conv`], [`grid`]), shape ([`shape`]), file ([`file`], [`onnx`]).
 
 pub mod conv;
 pub mod file;
-mod product;
+pub mod grid;
+mod lanes;
+pub mod onnx;
 pub mod shape;

@@ -8,7 +8,8 @@
 use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
 
-use super::conv::Conv;
+use super::conv::{After, Conv};
+use super::grid::Grid;
 use crate::class::Class;
 
 /// The network's image: columns, rows.
@@ -77,22 +78,35 @@ pub fn parts() -> [(std::ops::Range<usize>, std::ops::Range<usize>); LAYERS.len(
     })
 }
 
-/// Rows and columns of each layer's input (after doubling).
-fn sizes() -> [[usize; 2]; LAYERS.len()] {
-    let mut size = [INPUT[1], INPUT[0]];
+/// The grid of each layer's input (after doubling).
+fn grids() -> [Grid; LAYERS.len()] {
+    let mut grid = Grid { rows: INPUT[1], columns: INPUT[0] };
     LAYERS.map(|l| {
         if l.lateral.is_some() {
-            size = size.map(|s| 2 * s);
+            grid = Grid { rows: 2 * grid.rows, columns: 2 * grid.columns };
         }
-        let input = size;
-        size = size.map(|s| s / l.conv.stride);
+        let input = grid;
+        grid = l.output(grid);
         input
     })
 }
 
+impl Layer {
+    /// The grid of its output.
+    fn output(&self, input: Grid) -> Grid {
+        if self.conv.stride == 2 { input.half() } else { input }
+    }
+
+    /// What follows its sums.
+    fn after<'a>(&self, input: &'a [f32]) -> After<'a> {
+        let last = self.conv.kernel == 1;
+        After { add: self.residual.then_some(input), leak: if last { 1.0 } else { LEAK } }
+    }
+}
+
 /// Multiplications and additions of one frame.
 pub fn operations() -> usize {
-    LAYERS.iter().zip(sizes()).map(|(l, [rows, columns])| l.conv.operations(rows, columns)).sum()
+    LAYERS.iter().zip(grids()).map(|(l, grid)| l.conv.operations(grid.rows, grid.columns)).sum()
 }
 
 /// Random parameters (He et al., 2015); heat starts at one in fifty.
@@ -117,73 +131,75 @@ pub fn initial(rng: &mut ChaCha8Rng) -> Vec<f32> {
     all
 }
 
-/// Buffers of one pass, kept between frames.
+/// Buffers of one pass, kept between frames; images lie in them as [`Grid`] says.
 #[derive(Debug, Clone, Default)]
 pub struct Tape {
-    /// What each layer took, where it is not the output before.
-    mixed: Vec<Vec<f32>>,
+    /// What each layer took, where it is not the output before: the doubled sum, or the phases of a stride of 2.
+    inputs: Vec<Vec<f32>>,
     /// What each layer gave.
     outputs: Vec<Vec<f32>>,
     slopes: Vec<Vec<f32>>,
-    unfolded: Vec<f32>,
+    /// The gradient by a layer's input where it is not the output before.
     back: Vec<f32>,
+    /// The image, and the last output without borders.
+    image: Vec<f32>,
+    output: Vec<f32>,
 }
 
 impl Tape {
     /// Buffers.
     pub fn new() -> Self {
-        let sizes = sizes();
-        let outputs: Vec<Vec<f32>> = LAYERS
-            .iter()
-            .zip(sizes)
-            .map(|(l, [r, c])| vec![0.0; l.conv.outputs * (r / l.conv.stride) * (c / l.conv.stride)])
+        let pairs = || LAYERS.iter().zip(grids());
+        let outputs: Vec<Vec<f32>> =
+            pairs().map(|(l, grid)| vec![0.0; l.conv.outputs * l.output(grid).len()]).collect();
+        let inputs = pairs()
+            .map(|(l, grid)| {
+                let planes = if l.conv.stride == 2 { 4 * grid.half().len() } else { grid.len() };
+                let own = l.lateral.is_some() || l.conv.stride == 2;
+                vec![0.0; if own { l.conv.inputs * planes } else { 0 }]
+            })
             .collect();
-        let mixed = LAYERS
-            .iter()
-            .zip(sizes)
-            .map(|(l, [r, c])| if l.lateral.is_some() { vec![0.0; l.conv.inputs * r * c] } else { Vec::new() })
-            .collect();
-        Tape { mixed, slopes: outputs.clone(), outputs, unfolded: Vec::new(), back: Vec::new() }
+        let image = vec![0.0; 3 * grids()[0].len()];
+        let output = vec![0.0; OUTPUTS * (INPUT[0] / CELL) * (INPUT[1] / CELL)];
+        Tape { inputs, slopes: outputs.clone(), outputs, back: Vec::new(), image, output }
     }
 
     /// The last layer's output: [`OUTPUTS`] planes of 56 x 96 cells.
     pub fn output(&self) -> &[f32] {
-        self.outputs.last().map_or(&[], Vec::as_slice)
+        &self.output
     }
 }
 
 /// Runs the network on an image of three planes, values about [-1, 1].
 pub fn forward(parameters: &[f32], image: &[f32], tape: &mut Tape) {
-    let (parts, sizes) = (parts(), sizes());
+    let (parts, grids) = (parts(), grids());
+    grids[0].bordered(image, &mut tape.image);
     for (i, layer) in LAYERS.iter().enumerate() {
         let (weights, bias) = (&parameters[parts[i].0.clone()], &parameters[parts[i].1.clone()]);
         let (before, rest) = tape.outputs.split_at_mut(i);
-        let previous = before.last().map_or(image, Vec::as_slice);
-        let input = match layer.lateral {
-            Some(lateral) => {
-                double_and_add(previous, sizes[i], &before[lateral], &mut tape.mixed[i]);
-                tape.mixed[i].as_slice()
-            }
-            None => previous,
+        let previous = before.last().map_or(tape.image.as_slice(), Vec::as_slice);
+        let own = &mut tape.inputs[i];
+        let input = if let Some(lateral) = layer.lateral {
+            double_and_add(previous, grids[i], &before[lateral], own);
+            own.as_slice()
+        } else if layer.conv.stride == 2 {
+            grids[i].part(previous, own);
+            own.as_slice()
+        } else {
+            previous
         };
-        let output = &mut rest[0];
-        layer.conv.forward(weights, bias, input, sizes[i], output, &mut tape.unfolded);
-        if layer.residual {
-            output.iter_mut().zip(input).for_each(|(o, x)| *o += x);
-        }
-        if i + 1 < LAYERS.len() {
-            output.iter_mut().for_each(|o| *o = o.max(LEAK * *o));
-        }
+        layer.conv.forward(weights, bias, input, layer.output(grids[i]), layer.after(input), &mut rest[0]);
     }
+    let last = LAYERS.len() - 1;
+    grids[last].plain(&tape.outputs[last], &mut tape.output);
 }
 
-/// Adds to `gradient` that of a loss whose slope by the output is `slope`, after [`forward`] on `image`.
-pub fn backward(parameters: &[f32], image: &[f32], tape: &mut Tape, slope: &[f32], gradient: &mut [f32]) {
-    let (parts, sizes) = (parts(), sizes());
+/// Adds to `gradient` that of a loss whose slope by the output is `slope`, after [`forward`].
+pub fn backward(parameters: &[f32], tape: &mut Tape, slope: &[f32], gradient: &mut [f32]) {
+    let (parts, grids) = (parts(), grids());
     let last = LAYERS.len() - 1;
-    tape.slopes.iter_mut().for_each(|s| s.fill(0.0));
-    tape.slopes[last].copy_from_slice(slope);
-    let mut to_input = Vec::new();
+    tape.slopes[..last].iter_mut().for_each(|s| s.fill(0.0));
+    grids[last].bordered(slope, &mut tape.slopes[last]);
     for (i, layer) in LAYERS.iter().enumerate().rev() {
         let (before, rest) = tape.slopes.split_at_mut(i);
         let slope = &mut rest[0];
@@ -191,59 +207,55 @@ pub fn backward(parameters: &[f32], image: &[f32], tape: &mut Tape, slope: &[f32
             // The activation keeps the sign.
             slope.iter_mut().zip(&tape.outputs[i]).for_each(|(s, &o)| *s *= if o > 0.0 { 1.0 } else { LEAK });
         }
-        let input = match layer.lateral {
-            Some(_) => tape.mixed[i].as_slice(),
-            None => {
-                if i == 0 {
-                    image
-                } else {
-                    &tape.outputs[i - 1]
-                }
-            }
-        };
-        to_input.resize(input.len(), 0.0);
+        let own = layer.lateral.is_some() || layer.conv.stride == 2;
+        let input = if own { &tape.inputs[i] } else { &tape.outputs[i - 1] };
         let (weights, bias) = (&parts[i].0, &parts[i].1);
         let (to_weight, to_bias) = gradient[weights.start..bias.end].split_at_mut(weights.len());
-        let wanted = (i > 0).then_some(to_input.as_mut_slice());
-        layer.conv.backward(
-            &parameters[weights.clone()],
-            input,
-            sizes[i],
-            slope,
-            to_weight,
-            to_bias,
-            wanted,
-            &mut tape.unfolded,
-            &mut tape.back,
-        );
-        if i == 0 {
-            continue;
-        }
-        if layer.residual {
-            to_input.iter_mut().zip(slope.iter()).for_each(|(t, s)| *t += s);
+        let grid = layer.output(grids[i]);
+        layer.conv.to_weights(input, grid, slope, to_weight, to_bias);
+        let Some((previous, before)) = before.split_last_mut() else { continue };
+        let weights = &parameters[weights.clone()];
+        if own {
+            tape.back.clear();
+            tape.back.resize(input.len(), 0.0);
+            layer.conv.to_input(weights, grid, slope, &mut tape.back);
         }
         if let Some(lateral) = layer.lateral {
-            before[lateral].iter_mut().zip(&to_input).for_each(|(b, t)| *b += t);
-            let columns = sizes[i][1];
-            for (k, target) in before[i - 1].iter_mut().enumerate() {
-                let (row, column) = (k / (columns / 2), k % (columns / 2));
-                let at = 2 * row * columns + 2 * column;
-                *target += to_input[at] + to_input[at + 1] + to_input[at + columns] + to_input[at + columns + 1];
-            }
+            before[lateral].iter_mut().zip(&tape.back).for_each(|(b, t)| *b += t);
+            halve_and_add(&tape.back, grid, previous);
+        } else if own {
+            grids[i].join(&tape.back, previous);
         } else {
-            before[i - 1].iter_mut().zip(&to_input).for_each(|(b, t)| *b += t);
+            layer.conv.to_input(weights, grid, slope, previous);
+            if layer.residual {
+                previous.iter_mut().zip(slope.iter()).for_each(|(p, s)| *p += s);
+            }
         }
     }
 }
 
-/// `to` = each pixel of `small` four times + `lateral`; rows and columns are those of `to`. Rows of all planes follow
-/// each other, so planes need not be told apart.
-fn double_and_add(small: &[f32], [_, columns]: [usize; 2], lateral: &[f32], to: &mut [f32]) {
-    for (row, (line, add)) in to.chunks_exact_mut(columns).zip(lateral.chunks_exact(columns)).enumerate() {
-        let from = &small[(row / 2) * (columns / 2)..(row / 2 + 1) * (columns / 2)];
-        for ((pair, add), &value) in line.chunks_exact_mut(2).zip(add.chunks_exact(2)).zip(from) {
-            pair[0] = value + add[0];
-            pair[1] = value + add[1];
+/// `to` = each pixel of `small` four times + `lateral`, on the grid of `to`.
+fn double_and_add(small: &[f32], grid: Grid, lateral: &[f32], to: &mut [f32]) {
+    let half = grid.half();
+    let planes = to.chunks_exact_mut(grid.len()).zip(lateral.chunks_exact(grid.len()));
+    for ((to, lateral), small) in planes.zip(small.chunks_exact(half.len())) {
+        for row in 0..grid.rows {
+            let line = to[grid.row(row)].chunks_exact_mut(2).zip(lateral[grid.row(row)].chunks_exact(2));
+            for ((pair, add), &value) in line.zip(&small[half.row(row / 2)]) {
+                (pair[0], pair[1]) = (value + add[0], value + add[1]);
+            }
+        }
+    }
+}
+
+/// The other way: each pixel of `small` gets the sum of its four in `from`, on the grid of `from`.
+fn halve_and_add(from: &[f32], grid: Grid, small: &mut [f32]) {
+    let half = grid.half();
+    for (from, small) in from.chunks_exact(grid.len()).zip(small.chunks_exact_mut(half.len())) {
+        for row in 0..grid.rows {
+            for (value, pair) in small[half.row(row / 2)].iter_mut().zip(from[grid.row(row)].chunks_exact(2)) {
+                *value += pair[0] + pair[1];
+            }
         }
     }
 }
@@ -276,7 +288,7 @@ mod tests {
         forward(&weights, &image, &mut tape);
         let slope: Vec<f32> = (0..tape.output().len()).map(|_| rng.random_range(-1.0..1.0)).collect();
         let mut gradient = vec![0.0; weights.len()];
-        backward(&weights, &image, &mut tape, &slope, &mut gradient);
+        backward(&weights, &mut tape, &slope, &mut gradient);
         let mut loss = |moved: &[f32]| {
             forward(moved, &image, &mut tape);
             tape.output().iter().zip(&slope).map(|(o, s)| f64::from(o * s)).sum::<f64>()
