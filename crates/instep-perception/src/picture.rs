@@ -15,7 +15,8 @@ pub struct Frame {
     pub rgb: Vec<u8>,
 }
 
-/// A depth map: the distance along the optical axis of each pixel, m; NaN where the camera has none.
+/// A depth map: the distance along the optical axis of each pixel, m; infinity where it is too far to tell, minus infinity
+/// where it is too near, NaN where the camera has none for another reason (or does not tell the reason).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Depth {
     /// Pixels in a row.

@@ -89,7 +89,7 @@ pub fn floor_depth(camera: &Camera, pose: &CameraPose, safe_height: f32, u: f32,
 
 /// The two nearest obstacles, dummies where there are fewer. `frame` tells teams, where there is one.
 ///
-/// Depths that are not finite count as missing.
+/// Depths that are NaN, zero or less count as missing; infinity is too far to matter.
 pub fn nearest(
     settings: &Proximity,
     camera: &Camera,
@@ -103,8 +103,8 @@ pub fn nearest(
     let pixel = |k: usize| [((k % columns) * stride) as f32 + 0.5, ((k / columns) * stride) as f32 + 0.5];
     let mut found = Vec::new();
 
-    // Near field: what has no depth because it is nearer than the camera can.
-    let missing: Vec<bool> = (0..columns * rows).map(|k| !at(k).is_finite()).collect();
+    // Near field: what has no depth though it is not too far for one.
+    let missing: Vec<bool> = (0..columns * rows).map(|k| !(at(k) > 0.0)).collect();
     let share = missing.iter().filter(|m| **m).count() as f32 / missing.len().max(1) as f32;
     if share > settings.coverage[0] {
         for part in components(&missing, columns) {
@@ -368,10 +368,12 @@ mod tests {
         let camera = Camera::default();
         let pose = CameraPose::looking([0.0, 0.0, 1.3], 0.0, 0.3, 0.0);
         let map = |z: f32| Depth { width: 384, height: 224, meters: vec![z; 384 * 224] };
-        let found = nearest(&Proximity::default(), &camera, &pose, &map(f32::NAN), None);
-        assert!((found[0].depth - 0.15).abs() < 1e-6 && found[1].dummy);
-        for z in [f32::INFINITY, -1.0, 0.0, 1e30] {
-            nearest(&Proximity::default(), &camera, &pose, &map(z), None);
+        for z in [f32::NAN, f32::NEG_INFINITY, 0.0, -1.0] {
+            let found = nearest(&Proximity::default(), &camera, &pose, &map(z), None);
+            assert!((found[0].depth - 0.15).abs() < 1e-6 && found[1].dummy);
+        }
+        for z in [f32::INFINITY, 1e30] {
+            assert!(nearest(&Proximity::default(), &camera, &pose, &map(z), None).iter().all(|o| o.dummy), "{z}");
         }
     }
 

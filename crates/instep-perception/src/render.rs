@@ -19,14 +19,38 @@ use crate::scene::Scene;
 pub(crate) use ground::LineMap;
 use noise::Noise;
 
+/// Red, green and blue light of each pixel.
+type Light = [Vec<f32>; 3];
+
+/// A function that is also compiled for AVX2. Nothing is fused, so its bytes are the same with and without.
+macro_rules! also_wide {
+    ($name:ident, $body:ident, ($($arg:ident: $kind:ty),*) $(-> $out:ty)?) => {
+        pub(super) fn $name($($arg: $kind),*) $(-> $out)? {
+            #[cfg(target_arch = "x86_64")]
+            {
+                #[target_feature(enable = "avx2")]
+                fn wide($($arg: $kind),*) $(-> $out)? {
+                    $body($($arg),*)
+                }
+                if is_x86_feature_detected!("avx2") {
+                    // SAFETY: the processor has what the function is compiled for.
+                    return unsafe { wide($($arg),*) };
+                }
+            }
+            $body($($arg),*)
+        }
+    };
+}
+use also_wide;
+
 /// A renderer for one camera on one field. Its buffers are kept between frames.
 #[derive(Debug, Clone)]
 pub struct Renderer {
     camera: Camera,
     lines: LineMap,
     noise: Noise,
-    light: Vec<[f32; 3]>,
-    spare: Vec<[f32; 3]>,
+    light: Light,
+    spare: Light,
     depth: Vec<f32>,
     things: Vec<u16>,
 }
@@ -57,8 +81,8 @@ impl Renderer {
             camera,
             lines: LineMap::new(field),
             noise: Noise::new(),
-            light: vec![[0.0; 3]; pixels],
-            spare: vec![[0.0; 3]; pixels],
+            light: std::array::from_fn(|_| vec![0.0; pixels]),
+            spare: std::array::from_fn(|_| vec![0.0; pixels]),
             depth: vec![0.0; pixels],
             things: vec![0; pixels],
         }

@@ -5,8 +5,8 @@
 use instep_field::{Field, LandmarkClass, Line};
 use nalgebra::Vector3;
 
-use super::View;
 use super::noise::{Noise, hash};
+use super::{Light, View};
 use crate::camera::Camera;
 use crate::scene::{Look, Scene, Shadow};
 
@@ -68,6 +68,7 @@ impl LineMap {
     }
 
     /// Distance to the nearest line's middle, m, and its slope.
+    #[inline(always)]
     fn at(&self, x: f32, y: f32) -> (f32, [f32; 2]) {
         let (u, v) = ((x - self.origin[0]) / CELL, (y - self.origin[1]) / CELL);
         if !(u >= 0.0 && v >= 0.0 && u < (self.columns - 1) as f32 && v < (self.rows - 1) as f32) {
@@ -84,13 +85,23 @@ impl LineMap {
     }
 }
 
+super::also_wide!(
+    draw,
+    drawn,
+    (
+        camera: &Camera, scene: &Scene, lines: &LineMap, noise: &Noise, light: &mut Light, depth: &mut [f32],
+        things: &mut [u16]
+    )
+);
+
 /// Fills colour, depth and marks with ground and surroundings.
-pub(super) fn draw(
+#[inline(always)]
+fn drawn(
     camera: &Camera,
     scene: &Scene,
     lines: &LineMap,
     noise: &Noise,
-    light: &mut [[f32; 3]],
+    light: &mut Light,
     depth: &mut [f32],
     things: &mut [u16],
 ) {
@@ -100,13 +111,18 @@ pub(super) fn draw(
     let down = turn.column(1) * step;
     let shade = look.ambient + look.direct * look.light.z;
     let shift = [(look.texture % 251) as f32, (look.texture / 251 % 241) as f32];
+    let [red, green, blue] = light;
+    let lines_of = |row: usize| row * camera.width..(row + 1) * camera.width;
     for row in 0..camera.height {
         let first = turn * camera.ray(0.5, row as f32 + 0.5);
-        let base = row * camera.width;
-        for column in 0..camera.width {
-            let ray = first + along * column as f32;
-            let pixel = base + column;
-            things[pixel] = 0;
+        let (red, green, blue) = (&mut red[lines_of(row)], &mut green[lines_of(row)], &mut blue[lines_of(row)]);
+        let (depth, things) = (&mut depth[lines_of(row)], &mut things[lines_of(row)]);
+        let mut put = |pixel: usize, colour: [f32; 3], t: f32, thing: u16| {
+            [red[pixel], green[pixel], blue[pixel]] = colour;
+            (depth[pixel], things[pixel]) = (t, thing);
+        };
+        for pixel in 0..camera.width {
+            let ray = first + along * pixel as f32;
             if ray.z < -1e-4 {
                 let t = -eye.z / ray.z;
                 let (x, y) = (eye.x + t * ray.x, eye.y + t * ray.y);
@@ -115,19 +131,18 @@ pub(super) fn draw(
                     let (su, sv) = (along.z / ray.z, down.z / ray.z);
                     let du = [t * (along.x - ray.x * su), t * (along.y - ray.y * su)];
                     let dv = [t * (down.x - ray.x * sv), t * (down.y - ray.y * sv)];
-                    light[pixel] = turf(look, lines, noise, [x, y], du, dv, shift).map(|c| c * shade);
-                    depth[pixel] = t;
-                    things[pixel] = View::GROUND;
+                    let colour = turf(look, lines, noise, [x, y], du, dv, shift).map(|c| c * shade);
+                    put(pixel, colour, t, View::GROUND);
                     continue;
                 }
                 if x.abs() < look.hall[0] && y.abs() < look.hall[1] {
                     let tile = noise.smooth(4.0 * x + shift[0], 4.0 * y + shift[1]);
-                    light[pixel] = look.floor.map(|c| c * shade * (1.0 + 0.15 * tile));
-                    depth[pixel] = t;
+                    put(pixel, look.floor.map(|c| c * shade * (1.0 + 0.15 * tile)), t, 0);
                     continue;
                 }
             }
-            (light[pixel], depth[pixel]) = wall(look, eye, ray, shade);
+            let (colour, t) = wall(look, eye, ray, shade);
+            put(pixel, colour, t, 0);
         }
     }
     for shadow in &scene.shadows {
@@ -136,6 +151,7 @@ pub(super) fn draw(
 }
 
 /// Turf and lines at a place.
+#[inline(always)]
 fn turf(
     look: &Look,
     lines: &LineMap,
@@ -156,7 +172,8 @@ fn turf(
     if distance > 0.5 * FAR {
         return ground;
     }
-    let across = (slope[0] * du[0] + slope[1] * du[1]).hypot(slope[0] * dv[0] + slope[1] * dv[1]).clamp(1e-3, FAR);
+    let (right, down) = (slope[0] * du[0] + slope[1] * du[1], slope[0] * dv[0] + slope[1] * dv[1]);
+    let across = (right * right + down * down).sqrt().clamp(1e-3, FAR);
     let (low, high) = ((distance - across / 2.0).max(-lines.half_line), (distance + across / 2.0).min(lines.half_line));
     let mut cover = ((high - low) / across).clamp(0.0, 1.0);
     if cover > 0.0 && look.wear > 0.0 {
@@ -167,6 +184,7 @@ fn turf(
 }
 
 /// The inside of a hall.
+#[inline(always)]
 fn wall(look: &Look, eye: Vector3<f32>, ray: Vector3<f32>, shade: f32) -> ([f32; 3], f32) {
     let to = |axis: usize| {
         let edge = if ray[axis] > 0.0 { look.hall[axis] } else { -look.hall[axis] };
@@ -190,7 +208,8 @@ fn wall(look: &Look, eye: Vector3<f32>, ray: Vector3<f32>, shade: f32) -> ([f32;
 }
 
 /// Takes light from the ground inside a shadow.
-fn darken(camera: &Camera, scene: &Scene, shadow: &Shadow, light: &mut [[f32; 3]], depth: &[f32], things: &[u16]) {
+#[inline(always)]
+fn darken(camera: &Camera, scene: &Scene, shadow: &Shadow, light: &mut Light, depth: &[f32], things: &[u16]) {
     // The rectangle of pixels that the shadow's box can cover.
     let [a, b] = shadow.along;
     let reach =
@@ -215,7 +234,7 @@ fn darken(camera: &Camera, scene: &Scene, shadow: &Shadow, light: &mut [[f32; 3]
             let inside = 1.0 - along * along - across * across;
             if inside > 0.0 {
                 let keep = 1.0 - shadow.depth * (2.0 * inside).min(1.0);
-                light[pixel] = light[pixel].map(|c| c * keep);
+                light.iter_mut().for_each(|plane| plane[pixel] *= keep);
             }
         }
     }

@@ -5,6 +5,7 @@
 
 use nalgebra::Vector3;
 
+use super::Light;
 use super::noise::hash;
 use crate::camera::Camera;
 use crate::scene::{Paint, Scene, Shape, Solid};
@@ -50,52 +51,93 @@ pub(super) fn bounds<const N: usize>(camera: &Camera, spheres: [(Vector3<f32>, f
     (left < right && top < bottom).then_some([left, top, right, bottom])
 }
 
+super::also_wide!(
+    draw,
+    drawn,
+    (camera: &Camera, scene: &Scene, light: &mut Light, depth: &mut [f32], things: &mut [u16])
+);
+
 /// Draws all bodies over what is there, nearest first by depth.
-pub(super) fn draw(camera: &Camera, scene: &Scene, light: &mut [[f32; 3]], depth: &mut [f32], things: &mut [u16]) {
+#[inline(always)]
+fn drawn(camera: &Camera, scene: &Scene, light: &mut Light, depth: &mut [f32], things: &mut [u16]) {
+    let mut sheet = Sheet { light, depth, things };
     for solid in &scene.solids {
         let middle = scene.camera.camera_from_world(solid.position);
         let axis = scene.camera.rotation.tr_mul(&solid.rotation.column(2).into_owned());
-        let rectangle = match solid.shape {
-            Shape::Sphere(r) => bounds(camera, [(middle, r)]),
-            Shape::Capsule(r, half) => bounds(camera, [(middle - axis * half, r), (middle + axis * half, r)]),
-            Shape::Cylinder(r, half) => bounds(camera, [(middle - axis * half, r), (middle + axis * half, r)]),
+        let sheet = &mut sheet;
+        match solid.shape {
+            Shape::Sphere(r) => {
+                let rectangle = bounds(camera, [(middle, r)]);
+                fill(camera, scene, solid, rectangle, sheet, |origin, ray| sphere(origin, ray, r));
+            }
+            Shape::Capsule(r, half) => {
+                let rectangle = bounds(camera, [(middle - axis * half, r), (middle + axis * half, r)]);
+                fill(camera, scene, solid, rectangle, sheet, |origin, ray| capsule(origin, ray, r, half));
+            }
+            Shape::Cylinder(r, half) => {
+                let rectangle = bounds(camera, [(middle - axis * half, r), (middle + axis * half, r)]);
+                fill(camera, scene, solid, rectangle, sheet, |origin, ray| cylinder(origin, ray, r, half));
+            }
             Shape::Box(half) => {
                 let corner = |k: usize| {
                     let sign = |bit: usize, a: f32| if k >> bit & 1 == 0 { -a } else { a };
                     let local = Vector3::new(sign(0, half[0]), sign(1, half[1]), sign(2, half[2]));
                     (middle + scene.camera.rotation.tr_mul(&(solid.rotation * local)), 0.0)
                 };
-                bounds(camera, std::array::from_fn::<_, 8, _>(corner))
+                let rectangle = bounds(camera, std::array::from_fn::<_, 8, _>(corner));
+                fill(camera, scene, solid, rectangle, sheet, |origin, ray| cuboid(origin, ray, half));
             }
-        };
-        let Some([left, top, right, low]) = rectangle else { continue };
-        // Rays in the body's frame.
-        let local_from_camera = solid.rotation.tr_mul(&scene.camera.rotation);
-        let origin = solid.rotation.tr_mul(&(scene.camera.position - solid.position));
-        let sun = solid.rotation.tr_mul(&scene.look.light);
-        let up = solid.rotation.row(2).transpose();
-        let step = local_from_camera.column(0) / camera.focal();
-        for row in top..low {
-            let first = local_from_camera * camera.ray(left as f32 + 0.5, row as f32 + 0.5);
-            for column in left..right {
-                let ray = first + step * (column - left) as f32;
-                let Some((t, normal)) = hit(solid.shape, origin, ray) else { continue };
-                let pixel = row * camera.width + column;
-                if t < NEAR || t >= depth[pixel] {
-                    continue;
-                }
-                depth[pixel] = t;
-                things[pixel] = solid.thing;
-                let paint = colour(solid, origin + ray * t, normal);
-                let look = &scene.look;
-                let shade = look.ambient * (0.75 + 0.25 * normal.dot(&up)) + look.direct * normal.dot(&sun).max(0.0);
-                light[pixel] = paint.map(|c| c * shade);
+        }
+    }
+}
+
+/// What is drawn on.
+struct Sheet<'a> {
+    light: &'a mut Light,
+    depth: &'a mut [f32],
+    things: &'a mut [u16],
+}
+
+/// Draws what rays hit inside a rectangle.
+#[inline(always)]
+fn fill(
+    camera: &Camera,
+    scene: &Scene,
+    solid: &Solid,
+    rectangle: Option<[usize; 4]>,
+    sheet: &mut Sheet<'_>,
+    hit: impl Fn(Vector3<f32>, Vector3<f32>) -> Option<(f32, Vector3<f32>)>,
+) {
+    let Some([left, top, right, low]) = rectangle else { return };
+    let look = &scene.look;
+    // Rays in the body's frame.
+    let local_from_camera = solid.rotation.tr_mul(&scene.camera.rotation);
+    let origin = solid.rotation.tr_mul(&(scene.camera.position - solid.position));
+    let sun = solid.rotation.tr_mul(&look.light);
+    let up = solid.rotation.row(2).transpose();
+    let step = local_from_camera.column(0) / camera.focal();
+    for row in top..low {
+        let first = local_from_camera * camera.ray(left as f32 + 0.5, row as f32 + 0.5);
+        for column in left..right {
+            let ray = first + step * (column - left) as f32;
+            let Some((t, normal)) = hit(origin, ray) else { continue };
+            let pixel = row * camera.width + column;
+            if t < NEAR || t >= sheet.depth[pixel] {
+                continue;
+            }
+            sheet.depth[pixel] = t;
+            sheet.things[pixel] = solid.thing;
+            let paint = colour(solid, origin + ray * t, normal);
+            let shade = look.ambient * (0.75 + 0.25 * normal.dot(&up)) + look.direct * normal.dot(&sun).max(0.0);
+            for (plane, value) in sheet.light.iter_mut().zip(paint) {
+                plane[pixel] = value * shade;
             }
         }
     }
 }
 
 /// The surface's colour at a place of the body.
+#[inline(always)]
 fn colour(solid: &Solid, place: Vector3<f32>, normal: Vector3<f32>) -> [f32; 3] {
     match solid.paint {
         Paint::Plain(colour) => colour,
@@ -115,6 +157,7 @@ fn colour(solid: &Solid, place: Vector3<f32>, normal: Vector3<f32>) -> [f32; 3] 
 }
 
 /// Cosine of the angle to the nearest patch's middle: the twelve corners of an icosahedron, or the six axes.
+#[inline(always)]
 fn nearest_patch(normal: Vector3<f32>, six: bool) -> f32 {
     let [x, y, z] = [normal.x.abs(), normal.y.abs(), normal.z.abs()];
     if six {
@@ -126,51 +169,53 @@ fn nearest_patch(normal: Vector3<f32>, six: bool) -> f32 {
     (A * y + B * z).max(A * z + B * x).max(A * x + B * y)
 }
 
-/// Where a ray first meets a body from outside: the ray's parameter and the outward unit normal, body frame.
-fn hit(shape: Shape, origin: Vector3<f32>, ray: Vector3<f32>) -> Option<(f32, Vector3<f32>)> {
-    match shape {
-        Shape::Sphere(r) => sphere(origin, ray, r),
-        Shape::Capsule(r, half) => {
-            if let Some((t, normal)) = tube(origin, ray, r, half) {
-                return Some((t, normal));
-            }
-            let end = |z: f32| sphere(origin - Vector3::new(0.0, 0.0, z), ray, r);
-            match (end(half), end(-half)) {
-                (Some(a), Some(b)) => Some(if a.0 < b.0 { a } else { b }),
-                (a, b) => a.or(b),
-            }
-        }
-        Shape::Cylinder(r, half) => {
-            if let Some(found) = tube(origin, ray, r, half) {
-                return Some(found);
-            }
-            // The end toward the eye.
-            let side = -ray.z.signum();
-            let t = (side * half - origin.z) / ray.z;
-            let (x, y) = (origin.x + t * ray.x, origin.y + t * ray.y);
-            (t > 0.0 && x * x + y * y <= r * r).then_some((t, Vector3::new(0.0, 0.0, side)))
-        }
-        Shape::Box(half) => {
-            let (mut near, mut far, mut axis) = (f32::MIN, f32::MAX, 0);
-            for k in 0..3 {
-                let inverse = 1.0 / ray[k];
-                let (a, b) = ((-half[k] - origin[k]) * inverse, (half[k] - origin[k]) * inverse);
-                let (a, b) = (a.min(b), a.max(b));
-                if a > near {
-                    (near, axis) = (a, k);
-                }
-                far = far.min(b);
-            }
-            if !(near <= far && near > 0.0) {
-                return None;
-            }
-            let mut normal = Vector3::zeros();
-            normal[axis] = -ray[axis].signum();
-            Some((near, normal))
-        }
+// Where a ray first meets a body from outside: the ray's parameter and the outward unit normal, body frame.
+
+#[inline(always)]
+fn capsule(origin: Vector3<f32>, ray: Vector3<f32>, r: f32, half: f32) -> Option<(f32, Vector3<f32>)> {
+    if let Some(found) = tube(origin, ray, r, half) {
+        return Some(found);
+    }
+    let end = |z: f32| sphere(origin - Vector3::new(0.0, 0.0, z), ray, r);
+    match (end(half), end(-half)) {
+        (Some(a), Some(b)) => Some(if a.0 < b.0 { a } else { b }),
+        (a, b) => a.or(b),
     }
 }
 
+#[inline(always)]
+fn cylinder(origin: Vector3<f32>, ray: Vector3<f32>, r: f32, half: f32) -> Option<(f32, Vector3<f32>)> {
+    if let Some(found) = tube(origin, ray, r, half) {
+        return Some(found);
+    }
+    // The end toward the eye.
+    let side = -ray.z.signum();
+    let t = (side * half - origin.z) / ray.z;
+    let (x, y) = (origin.x + t * ray.x, origin.y + t * ray.y);
+    (t > 0.0 && x * x + y * y <= r * r).then_some((t, Vector3::new(0.0, 0.0, side)))
+}
+
+#[inline(always)]
+fn cuboid(origin: Vector3<f32>, ray: Vector3<f32>, half: [f32; 3]) -> Option<(f32, Vector3<f32>)> {
+    let (mut near, mut far, mut axis) = (f32::MIN, f32::MAX, 0);
+    for k in 0..3 {
+        let inverse = 1.0 / ray[k];
+        let (a, b) = ((-half[k] - origin[k]) * inverse, (half[k] - origin[k]) * inverse);
+        let (a, b) = (a.min(b), a.max(b));
+        if a > near {
+            (near, axis) = (a, k);
+        }
+        far = far.min(b);
+    }
+    if !(near <= far && near > 0.0) {
+        return None;
+    }
+    let mut normal = Vector3::zeros();
+    normal[axis] = -ray[axis].signum();
+    Some((near, normal))
+}
+
+#[inline(always)]
 fn sphere(origin: Vector3<f32>, ray: Vector3<f32>, r: f32) -> Option<(f32, Vector3<f32>)> {
     let (a, b, c) = (ray.dot(&ray), origin.dot(&ray), origin.dot(&origin) - r * r);
     let discriminant = b * b - a * c;
@@ -182,6 +227,7 @@ fn sphere(origin: Vector3<f32>, ray: Vector3<f32>, r: f32) -> Option<(f32, Vecto
 }
 
 /// The side of a cylinder along z between -half and half.
+#[inline(always)]
 fn tube(origin: Vector3<f32>, ray: Vector3<f32>, r: f32, half: f32) -> Option<(f32, Vector3<f32>)> {
     let a = ray.x * ray.x + ray.y * ray.y;
     let b = origin.x * ray.x + origin.y * ray.y;
@@ -222,7 +268,12 @@ mod tests {
             let origin = Vector3::from(from);
             let ray = (Vector3::from(toward) - origin).normalize();
             prop_assume!(outside(shape, origin) > 0.05);
-            let found = hit(shape, origin, ray);
+            let found = match shape {
+                Shape::Sphere(r) => sphere(origin, ray, r),
+                Shape::Capsule(r, half) => capsule(origin, ray, r, half),
+                Shape::Cylinder(r, half) => cylinder(origin, ray, r, half),
+                Shape::Box(half) => cuboid(origin, ray, half),
+            };
             let end = found.map_or(8.0, |(t, _)| t - 1e-3);
             for k in 0..400 {
                 let p = origin + ray * (end * k as f32 / 400.0);

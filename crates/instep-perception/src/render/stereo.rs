@@ -1,43 +1,50 @@
 //! What a stereo camera makes of depth: disparity with noise, hence an error that grows with the square of the
-//! distance; nothing too near; holes where the right eye cannot look behind an edge; blind patches.
+//! distance; minus infinity where something is too near, infinity where it is too far (as the ZED's library tells them
+//! apart); holes (NaN) where the right eye cannot look behind an edge; blind patches.
 
 use super::noise::Noise;
 use crate::camera::Camera;
 use crate::picture::Depth;
 
+super::also_wide!(depth, measured, (camera: &Camera, seed: u64, noise: &Noise, truth: &[f32]) -> Depth);
+
 /// The depth map that the camera delivers for true depths.
-pub(super) fn depth(camera: &Camera, seed: u64, noise: &Noise, truth: &[f32]) -> Depth {
+#[inline(always)]
+fn measured(camera: &Camera, seed: u64, noise: &Noise, truth: &[f32]) -> Depth {
     let (width, height) = (camera.width, camera.height);
     let strength = camera.focal() * camera.baseline as f32;
     let (nearest, farthest, deviation) = (camera.nearest as f32, camera.farthest as f32, camera.disparity_noise as f32);
     let mut meters = vec![f32::NAN; width * height];
     let shift = ((seed >> 8) & 0xff) as f32;
     // Matching works over windows, so its error is the same over some pixels, with a little of its own for each.
-    let mut normals = noise.normals((seed >> 20) as usize);
-    let blocks: Vec<f32> = (&mut normals).take((width / 4 + 1) * (height / 4 + 1)).collect();
-    for row in 0..height {
+    let normals = (seed >> 20) as usize % (1 << 20);
+    let blocks = width / 4 + 1;
+    let own_normals = normals + blocks * (height / 4 + 1);
+    let rows = truth.chunks_exact(width).zip(meters.chunks_exact_mut(width));
+    for (row, (truth, meters)) in rows.enumerate() {
         let mut leftmost = f32::MAX;
-        for column in (0..width).rev() {
-            let pixel = row * width + column;
-            let z = truth[pixel];
+        let smooth_row = row as f32 * 0.7 + 3.0 * shift;
+        for (turned, (&z, found)) in truth.iter().zip(meters).rev().enumerate() {
+            let column = width - 1 - turned;
             let disparity = strength / z;
             // Where this point lands in the right eye's image; something landed farther left already hides it.
             let landing = column as f32 - disparity;
             let hidden = landing > leftmost + 1.0;
             leftmost = leftmost.min(landing);
-            let own = normals.next().unwrap_or(0.0);
-            if hidden || !(z >= nearest && z <= farthest) {
+            let own = noise.normal(own_normals + row * width + turned);
+            let blind = noise.smooth(column as f32 * 0.5 + shift, smooth_row) > 0.93;
+            let block = noise.normal(normals + row / 4 * blocks + column / 4);
+            let seen = strength / (disparity + deviation * (0.8 * block + 0.6 * own));
+            if hidden || blind || z.is_nan() {
                 continue;
             }
-            if noise.smooth(column as f32 * 0.5 + shift, row as f32 * 0.7 + 3.0 * shift) > 0.93 {
-                continue;
-            }
-            let block = blocks[(row / 4) * (width / 4 + 1) + column / 4];
-            let seen = disparity + deviation * (0.8 * block + 0.6 * own);
-            let found = strength / seen;
-            if found >= nearest && found <= farthest {
-                meters[pixel] = found;
-            }
+            *found = if z < nearest || seen < nearest {
+                f32::NEG_INFINITY
+            } else if z > farthest || seen > farthest {
+                f32::INFINITY
+            } else {
+                seen
+            };
         }
     }
     Depth { width, height, meters }
