@@ -4,6 +4,7 @@
 //! batch is split into [`LANES`] parts whose gradients are added in their order, whoever computed them.
 
 pub mod loss;
+mod mirror;
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -15,7 +16,7 @@ use rand_chacha::ChaCha8Rng;
 use crate::PerceptionError;
 use crate::camera::Camera;
 use crate::label::{Label, labels};
-use crate::net::{file, shape};
+use crate::net::{file, onnx, shape};
 use crate::picture::Frame;
 use crate::render::Renderer;
 use crate::scene::random::{Split, scene};
@@ -95,6 +96,8 @@ impl Source for Rendered {
 /// One thread's tools.
 struct Lane<S> {
     source: S,
+    /// The examples of the batch before, to be seen once more, mirrored.
+    kept: Vec<(u64, Frame, Vec<Label>)>,
     tape: shape::Tape,
     planes: Vec<f32>,
     slope: Vec<f32>,
@@ -136,6 +139,7 @@ impl<S: Source> Training<S> {
             .into_iter()
             .map(|source| Lane {
                 source,
+                kept: Vec::new(),
                 tape: shape::Tape::new(),
                 planes: Vec::new(),
                 slope: Vec::new(),
@@ -167,12 +171,14 @@ impl<S: Source> Training<S> {
     /// # Errors
     /// When a stored frame cannot be read.
     pub fn step(&mut self) -> Result<f64, PerceptionError> {
-        let first = self.frames().wrapping_add(self.plan.seed << 40);
+        // Every second batch is the one before in a mirror: a frame costs more to make than to learn from.
+        let (first, mirrored) = (self.step / 2 * self.plan.batch as u64, self.step % 2 == 1);
+        let first = first.wrapping_add(self.plan.seed << 40);
         let share = (self.plan.batch / LANES).max(1);
         let weights = &self.weights;
         let work = |(l, lane): (usize, &mut Lane<S>)| {
             let from = first + (l * share) as u64;
-            lane.run(weights, from..from + share as u64);
+            lane.run(weights, from..from + share as u64, mirrored);
         };
         if self.plan.threads > 1 {
             std::thread::scope(|scope| {
@@ -225,7 +231,7 @@ impl<S: Source> Training<S> {
         }
     }
 
-    /// All that it needs to go on, as a file that is also a detector's.
+    /// All that it needs to go on, as a file that is a detector's too.
     ///
     /// # Errors
     /// [`PerceptionError::File`] when the file cannot be written.
@@ -238,6 +244,31 @@ impl<S: Source> Training<S> {
             ("training.step", &step),
         ];
         write(path, &file::bytes(&self.mean, &more, HashMap::new())?)
+    }
+
+    /// What it gave: the detector (safetensors), the same as ONNX, and its card beside it. `seen` says on what it learnt.
+    ///
+    /// # Errors
+    /// [`PerceptionError::File`] when a file cannot be written.
+    pub fn export(&self, path: &Path, seen: &str) -> Result<(), PerceptionError> {
+        let card = format!(
+            "# Detector\n- What: {} convolutions, {} parameters, {:.0} MFLOP (multiply and add counted apart) a frame of {} x {}, heat maps at stride {}.\n- Trained: {} frames ({seen}) in batches of {}, each made or read frame also in a mirror; Adam, highest step size {}, seed {}; mean of the last weights.\n- Measure it: `instep see eval --model {}`.\n",
+            shape::LAYERS.len(),
+            self.mean.len(),
+            shape::operations() as f64 / 1e6,
+            shape::INPUT[0],
+            shape::INPUT[1],
+            shape::CELL,
+            self.frames(),
+            self.plan.batch,
+            self.plan.rate,
+            self.plan.seed,
+            path.file_name().unwrap_or_default().display(),
+        );
+        let notes = HashMap::from([("card".to_owned(), card.clone())]);
+        write(path, &file::bytes(&self.mean, &[], notes)?)?;
+        write(&path.with_extension("onnx"), &onnx::bytes(&self.mean, &card))?;
+        write(&path.with_extension("md"), card.as_bytes())
     }
 
     /// Goes on from a checkpoint.
@@ -264,21 +295,29 @@ impl<S: Source> Training<S> {
 }
 
 impl<S: Source> Lane<S> {
-    fn run(&mut self, weights: &[f32], numbers: std::ops::Range<u64>) {
+    fn run(&mut self, weights: &[f32], numbers: std::ops::Range<u64>, mirrored: bool) {
         self.gradient.fill(0.0);
         self.loss = 0.0;
-        for number in numbers {
-            let (frame, labels) = match self.source.frame(number) {
-                Ok(pair) => pair,
-                Err(error) => {
-                    self.failed = Some(error);
-                    return;
+        if !self.kept.iter().map(|(number, ..)| *number).eq(numbers.clone()) {
+            self.kept.clear();
+            for number in numbers {
+                match self.source.frame(number) {
+                    Ok((frame, labels)) => self.kept.push((number, frame, labels)),
+                    Err(error) => {
+                        self.failed = Some(error);
+                        return;
+                    }
                 }
-            };
+            }
+        }
+        for (number, frame, labels) in &mut self.kept {
+            if mirrored {
+                mirror::mirror(frame, labels, *number);
+            }
             shape::image(&frame.rgb, &mut self.planes);
             shape::forward(weights, &self.planes, &mut self.tape);
-            self.loss += loss::loss(self.tape.output(), &labels, &mut self.slope);
-            shape::backward(weights, &self.planes, &mut self.tape, &self.slope, &mut self.gradient);
+            self.loss += loss::loss(self.tape.output(), labels, &mut self.slope);
+            shape::backward(weights, &mut self.tape, &self.slope, &mut self.gradient);
         }
     }
 }

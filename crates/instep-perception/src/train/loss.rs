@@ -11,12 +11,15 @@ use crate::net::shape::{CELL, INPUT, OUTPUTS, UNIT};
 /// Cells in a row and in a column.
 pub const GRID: [usize; 2] = [INPUT[0] / CELL, INPUT[1] / CELL];
 /// Weights of rest and of size against the heat.
-const REST: f32 = 0.6;
-const SIZE: f32 = 0.8;
+const REST: f32 = 1.0;
+const SIZE: f32 = 1.0;
 /// What a frame's loss is divided by: a usual number of labels, so that no frame counts more than another.
 const USUAL: f32 = 5.0;
-/// Cells with more of a hill than this learn rest and size.
-const NEAR: f32 = 0.6;
+/// Cells with more of a hill than this learn rest and size: the peak's and its neighbours, where a peak may be found too.
+const NEAR: f32 = 0.3;
+
+/// What the cells of one label count together at most for rest and size, in peaks.
+const MOST: f32 = 3.0;
 
 /// Deviation of a label's hill along an axis of a box of `side` pixels, cells.
 fn deviation(side: f32) -> f32 {
@@ -43,10 +46,17 @@ pub fn loss(output: &[f32], labels: &[Label], slope: &mut Vec<f32>) -> f64 {
             let (sx, sy) = (deviation(w), deviation(h));
             let reach =
                 |c: f32, s: f32, most: usize| ((c - 3.0 * s).max(0.0) as usize)..((c + 3.0 * s) as usize + 1).min(most);
+            let height = |row: usize, column: usize| {
+                let (dx, dy) = ((column as f32 - cx) / sx, (row as f32 - cy) / sy);
+                (-0.5 * (dx * dx + dy * dy)).exp()
+            };
+            let cells_near = reach(cy, sy, rows).flat_map(|r| reach(cx, sx, columns).map(move |c| (r, c)));
+            let all: f32 = cells_near.map(|(r, c)| height(r, c)).filter(|h| *h > NEAR).sum();
+            // A robot's hill is many times a ball's; its box shall not count as many times.
+            let share = (MOST / all).min(1.0);
             for row in reach(cy, sy, rows) {
                 for column in reach(cx, sx, columns) {
-                    let (dx, dy) = ((column as f32 - cx) / sx, (row as f32 - cy) / sy);
-                    let height = (-0.5 * (dx * dx + dy * dy)).exp();
+                    let height = height(row, column);
                     let cell = row * columns + column;
                     if label.ignored {
                         ignored[cell] |= height > 0.1;
@@ -66,8 +76,9 @@ pub fn loss(output: &[f32], labels: &[Label], slope: &mut Vec<f32>) -> f64 {
                                 let error = output[at] - value;
                                 // Smooth within a twentieth (Huber).
                                 let pull = (error / 0.05).clamp(-1.0, 1.0);
-                                slope[at] = weight * height / USUAL * pull;
-                                total += f64::from(weight * height / USUAL * error.abs());
+                                let weight = weight * share * height / USUAL;
+                                slope[at] = weight * pull;
+                                total += f64::from(weight * error.abs());
                             }
                         }
                     }
