@@ -1,7 +1,11 @@
 //! Labelled sets on disc: images with YOLO label files beside them, and one COCO file over all.
 //!
 //! `images/000000.png`, `labels/000000.txt` (class, middle and size as shares of the image; class numbers as in
-//! `data.yaml`), `annotations.json`. Reading takes the YOLO half, so a team's own folder can be trained on.
+//! `data.yaml`), `annotations.json`. Reading takes either half ([`coco`], [`yolo`]), so a team's own folder can be trained
+//! on.
+
+mod coco;
+mod yolo;
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -94,40 +98,31 @@ fn put(path: &Path, bytes: &[u8]) -> Result<(), PerceptionError> {
     std::fs::write(path, bytes).map_err(|e| PerceptionError::file(path, e))
 }
 
-/// A set on disc in YOLO's layout.
+/// A set on disc, all its labels read and checked.
 #[derive(Debug, Clone)]
-pub struct Folder {
-    images: Vec<PathBuf>,
-    labels: PathBuf,
-    /// Our class of each of the set's.
-    classes: Vec<Class>,
+pub struct Set {
+    images: Vec<(PathBuf, Vec<Label>)>,
 }
 
-impl Folder {
-    /// Opens a set and reads every label once.
+impl Set {
+    /// Opens a set: a folder in YOLO's layout (`images/`, `labels/`, `data.yaml`), a COCO file, or a folder with a COCO file
+    /// `annotations.json` and no `labels/`.
     ///
     /// # Errors
-    /// [`PerceptionError::File`] naming the file and line: no images, a class that is not known, a box outside the image.
-    pub fn open(folder: &Path) -> Result<Self, PerceptionError> {
-        let place = folder.join("images");
-        let entries = std::fs::read_dir(&place).map_err(|e| {
-            PerceptionError::file(&place, format!("{e}; expected YOLO's layout: images/, labels/, data.yaml"))
-        })?;
-        let mut images: Vec<PathBuf> = entries
-            .filter_map(|entry| entry.ok().map(|e| e.path()))
-            .filter(|path| {
-                path.extension().is_some_and(|e| ["png", "jpg", "jpeg"].iter().any(|k| e.eq_ignore_ascii_case(k)))
-            })
-            .collect();
-        images.sort();
+    /// [`PerceptionError::File`] naming file and place: no images, a class that is not known, a box outside the image.
+    pub fn open(path: &Path) -> Result<Self, PerceptionError> {
+        let listed = path.join("annotations.json");
+        let images = if path.is_file() {
+            coco::read(path)?
+        } else if listed.is_file() && !path.join("labels").is_dir() {
+            coco::read(&listed)?
+        } else {
+            yolo::read(path)?
+        };
         if images.is_empty() {
-            return Err(PerceptionError::file(&place, "no PNG or JPEG image"));
+            return Err(PerceptionError::file(path, "a set without images"));
         }
-        let folder = Folder { classes: classes(&folder.join("data.yaml"))?, labels: folder.join("labels"), images };
-        for k in 0..folder.images.len() {
-            folder.labels_of(k)?;
-        }
-        Ok(folder)
+        Ok(Set { images })
     }
 
     /// Number of frames.
@@ -140,100 +135,40 @@ impl Folder {
         self.images.is_empty()
     }
 
-    /// The labels of an image, at the network's size. No file means nothing is there.
-    fn labels_of(&self, k: usize) -> Result<Vec<Label>, PerceptionError> {
-        let name = self.images[k].file_stem().unwrap_or_default();
-        let path = self.labels.join(name).with_extension("txt");
-        if !path.exists() {
-            return Ok(Vec::new());
-        }
-        let text = std::fs::read_to_string(&path).map_err(|e| PerceptionError::file(&path, e))?;
-        text.lines()
-            .enumerate()
-            .filter(|(_, line)| !line.trim().is_empty())
-            .map(|(number, line)| {
-                let wrong = |what: String| PerceptionError::file(&path, format!("line {}: {what}", number + 1));
-                let values: Vec<f32> = line.split_whitespace().map_while(|word| word.parse().ok()).collect();
-                let [class, x, y, w, h] = values[..] else {
-                    return Err(wrong("expected five numbers: class x y width height".to_owned()));
-                };
-                let known = self.classes.get(class as usize).filter(|_| class >= 0.0 && class.fract() == 0.0);
-                let class = *known.ok_or_else(|| {
-                    wrong(format!("class {class}; expected 0 to {}", self.classes.len().saturating_sub(1)))
-                })?;
-                let inside =
-                    [x - w / 2.0, y - h / 2.0, 1.0 - x - w / 2.0, 1.0 - y - h / 2.0].iter().all(|v| *v >= -2e-3);
-                if !(inside && w > 0.0 && h > 0.0) {
-                    return Err(wrong(format!(
-                        "box {x} {y} {w} {h} outside the image; expected shares of its size from 0 to 1"
-                    )));
-                }
-                let [width, height] = shape::INPUT.map(|s| s as f32);
-                let rect = Rect::around([x * width, y * height], w * width, h * height);
-                Ok(Label { class, rect, team: None, ignored: false, place: [f32::NAN; 3] })
-            })
-            .collect()
-    }
-}
-
-impl Source for Folder {
-    fn frame(&mut self, number: u64) -> Result<(Frame, Vec<Label>), PerceptionError> {
-        // A stride that meets every image before one comes again, in a mixed order.
-        let n = self.images.len() as u64;
-        let k = (number.wrapping_mul(0x9e37_79b1) % n) as usize;
-        let [width, height] = shape::INPUT;
-        Ok((Frame::load(&self.images[k])?.resized(width, height), self.labels_of(k)?))
-    }
-}
-
-/// Frames of a set in their order.
-impl Folder {
     /// Frame `k`, at the network's size, with its labels.
     ///
     /// # Errors
     /// When the image cannot be read.
     pub fn get(&self, k: usize) -> Result<(Frame, Vec<Label>), PerceptionError> {
         let [width, height] = shape::INPUT;
-        Ok((Frame::load(&self.images[k])?.resized(width, height), self.labels_of(k)?))
+        let (path, labels) = &self.images[k % self.images.len().max(1)];
+        Ok((Frame::load(path)?.resized(width, height), labels.clone()))
     }
 }
 
-/// Our classes in the order of the set's `data.yaml`; ours where there is none.
-fn classes(path: &Path) -> Result<Vec<Class>, PerceptionError> {
-    if !path.exists() {
-        return Ok(Class::ALL.to_vec());
+impl Source for Set {
+    fn frame(&mut self, number: u64) -> Result<(Frame, Vec<Label>), PerceptionError> {
+        // A stride that meets every image before one comes again, in a mixed order.
+        let n = self.images.len() as u64;
+        self.get((number.wrapping_mul(0x9e37_79b1) % n) as usize)
     }
-    let text = std::fs::read_to_string(path).map_err(|e| PerceptionError::file(path, e))?;
-    let mut names = Vec::new();
-    let mut within = false;
-    for (number, line) in text.lines().enumerate() {
-        let line = line.trim_end();
-        let mut word = |name: &str| {
-            let name = name.trim().trim_matches(['"', '\'']);
-            if name.is_empty() {
-                return Ok(());
-            }
-            let class = Class::named(name).ok_or_else(|| {
-                let known = Class::ALL.map(Class::name).join(", ");
-                PerceptionError::file(path, format!("line {}: class \"{name}\"; expected one of {known}", number + 1))
-            })?;
-            names.push(class);
-            Ok(())
-        };
-        if let Some(rest) = line.strip_prefix("names:") {
-            within = true;
-            rest.trim().trim_matches(['[', ']']).split(',').try_for_each(&mut word)?;
-        } else if within && line.starts_with([' ', '-']) {
-            word(
-                line.trim_start_matches([' ', '-'])
-                    .split_once(':')
-                    .map_or(line.trim_start_matches([' ', '-']), |p| p.1),
-            )?;
-        } else {
-            within = false;
-        }
-    }
-    if names.is_empty() { Err(PerceptionError::file(path, "no names; expected a list `names:`")) } else { Ok(names) }
+}
+
+/// A box given as shares of the image, at the network's size; `None` when it is empty or outside the image.
+fn rect([x, y, w, h]: [f32; 4]) -> Option<Rect> {
+    let inside = [x - w / 2.0, y - h / 2.0, 1.0 - x - w / 2.0, 1.0 - y - h / 2.0].iter().all(|v| *v >= -2e-3);
+    let [width, height] = shape::INPUT.map(|s| s as f32);
+    (inside && w > 0.0 && h > 0.0).then(|| Rect::around([x * width, y * height], w * width, h * height))
+}
+
+/// The class of a name in a set's file.
+fn class(name: &str) -> Result<Class, String> {
+    Class::named(name)
+        .ok_or_else(|| format!("class \"{name}\"; expected one of {}", Class::ALL.map(Class::name).join(", ")))
+}
+
+fn label(class: Class, rect: Rect, ignored: bool) -> Label {
+    Label { class, rect, team: None, ignored, place: [f32::NAN; 3] }
 }
 
 #[cfg(test)]
@@ -253,15 +188,45 @@ mod tests {
         let mut writer = Writer::new(folder.path()).unwrap();
         writer.add(&frame, &[label]).unwrap();
         writer.finish().unwrap();
-        let (back, labels) = Folder::open(folder.path()).unwrap().get(0).unwrap();
+        let (back, labels) = Set::open(folder.path()).unwrap().get(0).unwrap();
         assert_eq!((back, labels[0].class), (frame, Class::T));
         assert!(labels[0].rect.iou(&label.rect) > 0.999);
     }
 
     #[test]
+    fn the_coco_half_alone_is_a_set_too_and_what_is_wrong_in_it_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let (frame, label) = small();
+        let mut writer = Writer::new(folder.path()).unwrap();
+        writer.add(&frame, &[label, Label { ignored: true, class: Class::X, ..label }]).unwrap();
+        writer.finish().unwrap();
+        std::fs::remove_dir_all(folder.path().join("labels")).unwrap();
+        let (_, labels) = Set::open(folder.path()).unwrap().get(0).unwrap();
+        assert_eq!(
+            labels.iter().map(|l| (l.class, l.ignored)).collect::<Vec<_>>(),
+            [(Class::T, false), (Class::X, true)]
+        );
+        assert!(labels[0].rect.iou(&label.rect) > 0.999);
+        let path = folder.path().join("annotations.json");
+        let good = std::fs::read_to_string(&path).unwrap();
+        for (from, to, part) in [
+            ("\"bbox\":[100.0", "\"bbox\":[900.0", "annotations[0].bbox"),
+            ("\"category_id\":5", "\"category_id\":50", "annotations[0].category_id: 50"),
+            ("\"image_id\":0", "\"image_id\":7", "annotations[0].image_id: 7"),
+            ("\"name\":\"T\"", "\"name\":\"unicorn\"", "categories[4]: class \"unicorn\""),
+            ("\"width\":384", "\"width\":0", "images[0]"),
+            ("{", "", "expected a COCO file"),
+        ] {
+            std::fs::write(&path, good.replacen(from, to, 1)).unwrap();
+            let said = Set::open(folder.path()).unwrap_err().to_string();
+            assert!(said.contains("annotations.json") && said.contains(part), "{said}");
+        }
+    }
+
+    #[test]
     fn broken_labels_images_and_classes_are_named_by_file_and_line() {
         let folder = tempfile::tempdir().unwrap();
-        let said = || Folder::open(folder.path()).unwrap_err().to_string();
+        let said = || Set::open(folder.path()).unwrap_err().to_string();
         assert!(said().contains("expected YOLO's layout"));
         let (frame, label) = small();
         let mut writer = Writer::new(folder.path()).unwrap();
@@ -282,6 +247,6 @@ mod tests {
         std::fs::remove_file(folder.path().join("data.yaml")).unwrap();
         std::fs::write(&path, "").unwrap();
         std::fs::write(folder.path().join("images/000000.png"), b"no image").unwrap();
-        assert!(Folder::open(folder.path()).unwrap().get(0).unwrap_err().to_string().contains("000000.png"));
+        assert!(Set::open(folder.path()).unwrap().get(0).unwrap_err().to_string().contains("000000.png"));
     }
 }
