@@ -1,7 +1,9 @@
-//! What the renderer is given: plain data, filled at random ([`random`]) or from a world's state.
+//! What the renderer is given: plain data, filled at random ([`random`]) or from a world's state ([`staged`]).
 
 pub mod humanoid;
+pub mod moving;
 pub mod random;
+pub mod staged;
 
 use nalgebra::{Matrix3, Vector3};
 

@@ -22,15 +22,36 @@ pub enum Split {
     Test,
 }
 
-/// One random scene of `split`.
+/// How a head carries its camera: the ranges of its height (m) and of its look down (rad).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Mount {
+    /// Least and greatest height, m.
+    pub height: [f32; 2],
+    /// Least and greatest angle below the horizon, rad.
+    pub pitch: [f32; 2],
+}
+
+impl Default for Mount {
+    /// An adult-size humanoid's.
+    fn default() -> Self {
+        Mount { height: [1.05, 1.45], pitch: [0.08, 0.62] }
+    }
+}
+
+/// One random scene of `split`, seen by an adult-size humanoid.
 pub fn scene(field: &Field, camera: &Camera, split: Split, seed: u64) -> Scene {
+    scene_from(&Mount::default(), field, camera, split, seed)
+}
+
+/// One random scene of `split`, seen from a camera of `mount`.
+pub fn scene_from(mount: &Mount, field: &Field, camera: &Camera, split: Split, seed: u64) -> Scene {
     // The splits' seeds never meet.
     let test = split == Split::Test;
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     rng.set_stream(if test { 2 } else { 1 });
     let rng = &mut rng;
     let look = look(camera, test, rng);
-    let pose = camera_pose(field, rng);
+    let pose = camera_pose(mount, field, rng);
     let mut scene = Scene::new(pose, look, rng.random());
     let white = paint_white(rng);
     let (post, net) = (rng.random_range(0.045..0.065), rng.random_bool(0.5));
@@ -108,9 +129,10 @@ fn look(camera: &Camera, test: bool, rng: &mut ChaCha8Rng) -> Look {
 }
 
 /// A head over the field that mostly looks at something of it.
-fn camera_pose(field: &Field, rng: &mut ChaCha8Rng) -> CameraPose {
+fn camera_pose(mount: &Mount, field: &Field, rng: &mut ChaCha8Rng) -> CameraPose {
     let (x, y) = (field.length as f32 / 2.0 + 0.4, field.width as f32 / 2.0 + 0.4);
-    let position = [rng.random_range(-x..x), rng.random_range(-y..y), rng.random_range(1.05..1.45f32)];
+    let [low, high] = mount.height;
+    let position = [rng.random_range(-x..x), rng.random_range(-y..y), rng.random_range(low..=high)];
     let landmarks: Vec<Landmark> = field
         .landmarks()
         .into_iter()
@@ -129,7 +151,8 @@ fn camera_pose(field: &Field, rng: &mut ChaCha8Rng) -> CameraPose {
         let at = if of_class.is_empty() { &landmarks[0] } else { of_class[rng.random_range(0..of_class.len())] };
         (at.y as f32 - position[1]).atan2(at.x as f32 - position[0]) + rng.random_range(-0.55..0.55)
     };
-    CameraPose::looking(position, yaw, rng.random_range(0.08..0.62), rng.random_range(-0.06..0.06))
+    let [level, down] = mount.pitch;
+    CameraPose::looking(position, yaw, rng.random_range(level..=down), rng.random_range(-0.06..0.06))
 }
 
 /// A place on the ground that the camera sees, `near` to `far` ahead; log-uniform in distance.
