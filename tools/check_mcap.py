@@ -22,6 +22,8 @@ TYPES = {
     "/ball": "geometry_msgs/msg/PoseStamped",
     "/imu": "sensor_msgs/msg/Imu",
     "/events": "std_msgs/msg/String",
+    "/camera/image/compressed": "sensor_msgs/msg/CompressedImage",
+    "/camera/annotations": "foxglove_msgs/msg/ImageAnnotations",
 }
 
 
@@ -48,6 +50,10 @@ def check_message(topic, log_time, message):
         return "a rotation is not a unit quaternion"
     if topic == "/ball" and not unit(message.pose.orientation):
         return "the orientation is not a unit quaternion"
+    if topic == "/camera/image/compressed" and bytes(message.data[:8]) != b"\x89PNG\r\n\x1a\n":
+        return "the image is no PNG file"
+    if topic == "/camera/annotations" and any(len(points.points) != 4 for points in message.points):
+        return "a box without four corners"
     if topic == "/events" and not message.data:
         return "empty event"
     return None

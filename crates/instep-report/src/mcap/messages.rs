@@ -148,3 +148,63 @@ mod tests {
         }
     }
 }
+
+/// sensor_msgs/msg/CompressedImage.
+#[derive(Serialize)]
+pub(super) struct CompressedImage<'a> {
+    pub(super) header: Header<'a>,
+    pub(super) format: &'a str,
+    pub(super) data: &'a [u8],
+}
+
+/// foxglove_msgs/msg/Point2.
+#[derive(Serialize)]
+pub(super) struct Point2 {
+    pub(super) x: f64,
+    pub(super) y: f64,
+}
+
+/// foxglove_msgs/msg/Color.
+#[derive(Serialize, Clone, Copy)]
+pub(super) struct Color {
+    pub(super) r: f64,
+    pub(super) g: f64,
+    pub(super) b: f64,
+    pub(super) a: f64,
+}
+
+/// foxglove_msgs/msg/PointsAnnotation.
+#[derive(Serialize)]
+pub(super) struct PointsAnnotation {
+    pub(super) timestamp: Time,
+    pub(super) kind: u8,
+    pub(super) points: Vec<Point2>,
+    pub(super) outline_color: Color,
+    pub(super) outline_colors: Vec<Color>,
+    pub(super) fill_color: Color,
+    pub(super) thickness: f64,
+}
+
+impl PointsAnnotation {
+    /// A closed line.
+    pub(super) const LINE_LOOP: u8 = 2;
+}
+
+/// foxglove_msgs/msg/TextAnnotation.
+#[derive(Serialize)]
+pub(super) struct TextAnnotation<'a> {
+    pub(super) timestamp: Time,
+    pub(super) position: Point2,
+    pub(super) text: &'a str,
+    pub(super) font_size: f64,
+    pub(super) text_color: Color,
+    pub(super) background_color: Color,
+}
+
+/// foxglove_msgs/msg/ImageAnnotations; there are never circles.
+#[derive(Serialize)]
+pub(super) struct ImageAnnotations<'a> {
+    pub(super) circles: Vec<Point2>,
+    pub(super) points: Vec<PointsAnnotation>,
+    pub(super) texts: Vec<TextAnnotation<'a>>,
+}

@@ -8,6 +8,8 @@
 //! | `/imu` | `sensor_msgs/msg/Imu` | the sensor's link |
 //! | `/events` | `std_msgs/msg/String` | – |
 //! | `/robot_description` | `std_msgs/msg/String`: a URDF, once | its links are the frames of `/tf` |
+//! | `/camera/image/compressed` | `sensor_msgs/msg/CompressedImage` | `camera` |
+//! | `/camera/annotations` | `foxglove_msgs/msg/ImageAnnotations` | pixels of that image |
 //!
 //! Every stamp is the time of the trial, never the clock of this machine: the same trial gives the same bytes. The file
 //! is built in memory (a few hundred bytes a frame) and written in one step.
@@ -23,7 +25,7 @@ use serde::Serialize;
 
 use crate::{ReportError, file};
 use messages as msg;
-use schemas::{BALL, DESCRIPTION, EVENTS, IMU, JOINT_STATES, TF, Topic};
+use schemas::{ANNOTATIONS, BALL, DESCRIPTION, EVENTS, IMAGE, IMU, JOINT_STATES, TF, Topic};
 
 /// The frame that `/tf` and `/ball` are given in.
 pub const WORLD: &str = "world";
@@ -68,6 +70,17 @@ pub struct Imu<'a> {
     pub angular_velocity: [f64; 3],
     /// Specific force, sensor frame, m/s^2 (at rest: +9.81 upwards).
     pub linear_acceleration: [f64; 3],
+}
+
+/// A box in an image, with what is written at it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ImageBox<'a> {
+    /// Left, upper, right and lower edge, pixels.
+    pub edges: [f64; 4],
+    /// Red, green and blue, 0 to 1.
+    pub color: [f64; 3],
+    /// What is written at it.
+    pub text: &'a str,
 }
 
 /// A recording under construction.
@@ -176,6 +189,47 @@ impl Recording {
             linear_acceleration_covariance: [0.0; 9],
         };
         self.write(&IMU, time, &message)
+    }
+
+    /// Adds a frame of the camera at `time` (s): the bytes of a PNG file.
+    ///
+    /// # Errors
+    /// [`ReportError::Time`] for an impossible time.
+    pub fn image(&mut self, time: f64, png: &[u8]) -> Result<(), ReportError> {
+        let header = msg::Header::new(&IMAGE, time, "camera")?;
+        self.write(&IMAGE, time, &msg::CompressedImage { header, format: "png", data: png })
+    }
+
+    /// Adds boxes over the frame of the same time (s).
+    ///
+    /// # Errors
+    /// [`ReportError::Time`] for an impossible time.
+    pub fn annotations(&mut self, time: f64, boxes: &[ImageBox<'_>]) -> Result<(), ReportError> {
+        let timestamp = msg::Time::new(&ANNOTATIONS, time)?;
+        let color = |[r, g, b]: [f64; 3], a: f64| msg::Color { r, g, b, a };
+        let points = boxes.iter().map(|b| {
+            let [left, top, right, low] = b.edges;
+            let corners = [[left, top], [right, top], [right, low], [left, low]];
+            msg::PointsAnnotation {
+                timestamp,
+                kind: msg::PointsAnnotation::LINE_LOOP,
+                points: corners.map(|[x, y]| msg::Point2 { x, y }).into(),
+                outline_color: color(b.color, 1.0),
+                outline_colors: Vec::new(),
+                fill_color: color([0.0; 3], 0.0),
+                thickness: 1.0,
+            }
+        });
+        let texts = boxes.iter().map(|b| msg::TextAnnotation {
+            timestamp,
+            position: msg::Point2 { x: b.edges[0], y: b.edges[1] },
+            text: b.text,
+            font_size: 8.0,
+            text_color: color(b.color, 1.0),
+            background_color: color([0.0; 3], 0.5),
+        });
+        let message = msg::ImageAnnotations { circles: Vec::new(), points: points.collect(), texts: texts.collect() };
+        self.write(&ANNOTATIONS, time, &message)
     }
 
     /// Adds an event at `time` (s).

@@ -61,6 +61,40 @@ pub(super) const IMU: Topic = Topic {
     needs: &[HEADER, TIME, QUATERNION, VECTOR3],
 };
 
+pub(super) const IMAGE: Topic = Topic {
+    name: "/camera/image/compressed",
+    message: "sensor_msgs/msg/CompressedImage",
+    fields: "std_msgs/Header header\nstring format\nuint8[] data\n",
+    needs: &[HEADER, TIME],
+};
+
+const POINT2: Definition = ("foxglove_msgs/Point2", "float64 x\nfloat64 y\n");
+const COLOR: Definition = ("foxglove_msgs/Color", "float64 r\nfloat64 g\nfloat64 b\nfloat64 a\n");
+const CIRCLE: Definition = (
+    "foxglove_msgs/CircleAnnotation",
+    "builtin_interfaces/Time timestamp\nfoxglove_msgs/Point2 position\nfloat64 diameter\nfloat64 thickness\n\
+        foxglove_msgs/Color fill_color\nfoxglove_msgs/Color outline_color\n",
+);
+const POINTS: Definition = (
+    "foxglove_msgs/PointsAnnotation",
+    "builtin_interfaces/Time timestamp\nuint8 type\nfoxglove_msgs/Point2[] points\n\
+        foxglove_msgs/Color outline_color\nfoxglove_msgs/Color[] outline_colors\nfoxglove_msgs/Color fill_color\n\
+        float64 thickness\n",
+);
+const TEXT: Definition = (
+    "foxglove_msgs/TextAnnotation",
+    "builtin_interfaces/Time timestamp\nfoxglove_msgs/Point2 position\nstring text\nfloat64 font_size\n\
+        foxglove_msgs/Color text_color\nfoxglove_msgs/Color background_color\n",
+);
+
+pub(super) const ANNOTATIONS: Topic = Topic {
+    name: "/camera/annotations",
+    message: "foxglove_msgs/msg/ImageAnnotations",
+    fields: "foxglove_msgs/CircleAnnotation[] circles\nfoxglove_msgs/PointsAnnotation[] points\n\
+        foxglove_msgs/TextAnnotation[] texts\n",
+    needs: &[CIRCLE, POINTS, TEXT, POINT2, COLOR, TIME],
+};
+
 pub(super) const EVENTS: Topic =
     Topic { name: "/events", message: "std_msgs/msg/String", fields: "string data\n", needs: &[] };
 
