@@ -14,5 +14,6 @@ mod kick;
 mod learn;
 mod retarget;
 mod robot;
+mod see;
 mod support;
 mod tune;
