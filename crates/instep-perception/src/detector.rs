@@ -31,12 +31,13 @@ pub struct Detector {
     weights: Vec<f32>,
     tape: shape::Tape,
     planes: Vec<f32>,
+    maps: Vec<f32>,
 }
 
 impl Detector {
     /// Of a flat vector of parameters of [`shape::parameters`] numbers.
     pub fn new(weights: Vec<f32>) -> Self {
-        Detector { weights, tape: shape::Tape::new(), planes: Vec::new() }
+        Detector { weights, tape: shape::Tape::new(), planes: Vec::new(), maps: Vec::new() }
     }
 
     /// Reads a detector's file.
@@ -63,7 +64,13 @@ impl Detector {
         }
         shape::image(&frame.rgb, &mut self.planes);
         shape::forward(&self.weights, &self.planes, &mut self.tape);
-        let mut found = peaks(self.tape.output(), threshold);
+        self.maps.clear();
+        self.maps.extend_from_slice(self.tape.output());
+        // The same in a mirror: two opinions are better than one, and there is time for both.
+        self.planes.chunks_exact_mut(width).for_each(<[f32]>::reverse);
+        shape::forward(&self.weights, &self.planes, &mut self.tape);
+        average(&mut self.maps, self.tape.output());
+        let mut found = peaks(&self.maps, threshold);
         for detection in found.iter_mut().filter(|d| d.class == Class::Robot) {
             detection.team = team(frame, &detection.rect);
         }
@@ -71,7 +78,26 @@ impl Detector {
     }
 }
 
-/// The peaks of the heat maps.
+/// The mean of maps and of those of the mirrored frame.
+fn average(maps: &mut [f32], mirrored: &[f32]) {
+    let [columns, rows] = GRID;
+    let rest = Class::ALL.map(regression);
+    for (channel, (to, from)) in
+        maps.chunks_exact_mut(columns * rows).zip(mirrored.chunks_exact(columns * rows)).enumerate()
+    {
+        let sign = if rest.contains(&channel) { -1.0 } else { 1.0 };
+        for (to, from) in to.chunks_exact_mut(columns).zip(from.chunks_exact(columns)) {
+            for (a, b) in to.iter_mut().zip(from.iter().rev()) {
+                *a = 0.5 * (*a + sign * b);
+            }
+        }
+    }
+}
+
+/// Share of a peak's confidence that a neighbour must have to have a say in its box.
+const SAY: f32 = 0.4;
+
+/// The peaks of the heat maps. A box is the mean of what the peak and its neighbours say, by their confidence.
 fn peaks(output: &[f32], threshold: f32) -> Vec<Detection> {
     let [columns, rows] = GRID;
     let cells = columns * rows;
@@ -84,16 +110,30 @@ fn peaks(output: &[f32], threshold: f32) -> Vec<Detection> {
             let (row, column) = (cell / columns, cell % columns);
             let around = (row.saturating_sub(1)..(row + 2).min(rows))
                 .flat_map(|r| (column.saturating_sub(1)..(column + 2).min(columns)).map(move |c| r * columns + c));
-            if around.into_iter().any(|other| heat[other] > z || (heat[other] == z && other < cell)) {
+            if around.clone().any(|other| heat[other] > z || (heat[other] == z && other < cell)) {
                 continue;
             }
-            let value = |k: usize| output[(regression(class) + k) * cells + cell];
-            let unit = shape::CELL as f32;
-            let middle = [(column as f32 + 0.5 + value(0)) * unit, (row as f32 + 0.5 + value(1)) * unit];
-            let side = |k: usize| shape::UNIT * value(k).clamp(-4.0, 4.0).exp();
-            let rect = Rect::around(middle, side(2), side(3)).meet(&frame);
+            let confidence = sigmoid(z);
+            let (mut edges, mut all) = ([0.0f32; 4], 0.0);
+            for other in around {
+                let say = sigmoid(heat[other]);
+                if say < SAY * confidence {
+                    continue;
+                }
+                let value = |k: usize| output[(regression(class) + k) * cells + other];
+                let at = |place: usize, rest: f32| (place as f32 + 0.5 + rest) * shape::CELL as f32;
+                let middle = [at(other % columns, value(0)), at(other / columns, value(1))];
+                let side = |k: usize| shape::UNIT * value(k).clamp(-4.0, 4.0).exp();
+                let rect = Rect::around(middle, side(2), side(3));
+                for (sum, edge) in edges.iter_mut().zip([rect.left, rect.top, rect.right, rect.low]) {
+                    *sum += say * edge;
+                }
+                all += say;
+            }
+            let [left, top, right, low] = edges.map(|edge| edge / all);
+            let rect = Rect { left, top, right, low }.meet(&frame);
             if rect.area() > 0.0 {
-                found.push(Detection { class, rect, confidence: 1.0 / (1.0 + (-z).exp()), team: None });
+                found.push(Detection { class, rect, confidence, team: None });
             }
         }
     }
@@ -105,6 +145,10 @@ fn peaks(output: &[f32], threshold: f32) -> Vec<Detection> {
         }
     }
     kept
+}
+
+fn sigmoid(z: f32) -> f32 {
+    1.0 / (1.0 + (-z).exp())
 }
 
 /// The team of a robot by the hues in the middle of its box: the colour with more strong pixels, at least 2 % of them.
