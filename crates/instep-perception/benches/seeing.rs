@@ -6,7 +6,7 @@ use std::time::Instant;
 use instep_field::Field;
 use instep_perception::after::sights::sights;
 use instep_perception::camera::Camera;
-use instep_perception::detector::{Detector, THRESHOLD};
+use instep_perception::detector::{Detector, THRESHOLDS};
 use instep_perception::net::shape;
 use instep_perception::proximity::{self, Proximity};
 use instep_perception::render::Renderer;
@@ -33,7 +33,7 @@ fn main() {
         lap(0);
         let view = renderer.render(&scene);
         lap(1);
-        let found = detector.detect(&view.frame, THRESHOLD).expect("a frame of the network's size");
+        let found = detector.detect(&view.frame, &THRESHOLDS).expect("a frame of the network's size");
         lap(2);
         let radius = field.ball.radius as f32;
         std::hint::black_box(sights(&camera, &scene.camera, radius, &view.frame, &view.depth, &found));

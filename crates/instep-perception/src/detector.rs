@@ -53,11 +53,15 @@ impl Detector {
         &self.weights
     }
 
-    /// All peaks above `threshold`, the most confident first.
+    /// All peaks above their class's threshold (such as [`THRESHOLDS`]), the most confident first.
     ///
     /// # Errors
     /// [`PerceptionError::Size`] for a frame of another size than the network's.
-    pub fn detect(&mut self, frame: &Frame, threshold: f32) -> Result<Vec<Detection>, PerceptionError> {
+    pub fn detect(
+        &mut self,
+        frame: &Frame,
+        thresholds: &[f32; Class::ALL.len()],
+    ) -> Result<Vec<Detection>, PerceptionError> {
         let [width, height] = shape::INPUT;
         if (frame.width, frame.height) != (width, height) || frame.rgb.len() != 3 * width * height {
             return Err(PerceptionError::Size { found_width: frame.width, found_height: frame.height, width, height });
@@ -70,7 +74,7 @@ impl Detector {
         self.planes.chunks_exact_mut(width).for_each(<[f32]>::reverse);
         shape::forward(&self.weights, &self.planes, &mut self.tape);
         average(&mut self.maps, self.tape.output());
-        let mut found = peaks(&self.maps, threshold);
+        let mut found = peaks(&self.maps, thresholds);
         for detection in found.iter_mut().filter(|d| d.class == Class::Robot) {
             detection.team = team(frame, &detection.rect);
         }
@@ -98,14 +102,15 @@ fn average(maps: &mut [f32], mirrored: &[f32]) {
 const SAY: f32 = 0.4;
 
 /// The peaks of the heat maps. A box is the mean of what the peak and its neighbours say, by their confidence.
-fn peaks(output: &[f32], threshold: f32) -> Vec<Detection> {
+fn peaks(output: &[f32], thresholds: &[f32; Class::ALL.len()]) -> Vec<Detection> {
     let [columns, rows] = GRID;
     let cells = columns * rows;
-    let least = (threshold / (1.0 - threshold).max(1e-6)).ln();
     let frame = Rect { left: 0.0, top: 0.0, right: shape::INPUT[0] as f32, low: shape::INPUT[1] as f32 };
     let mut found = Vec::new();
     for class in Class::ALL {
         let heat = &output[class.index() * cells..(class.index() + 1) * cells];
+        let threshold = thresholds[class.index()];
+        let least = (threshold / (1.0 - threshold).max(1e-6)).ln();
         for (cell, &z) in heat.iter().enumerate().filter(|(_, z)| **z > least) {
             let (row, column) = (cell / columns, cell % columns);
             let around = (row.saturating_sub(1)..(row + 2).min(rows))
@@ -171,8 +176,15 @@ pub fn team(frame: &Frame, rect: &Rect) -> Option<Team> {
     }
 }
 
-/// Confidence above which the shipped detector's finds are used.
-pub const THRESHOLD: f32 = 0.4;
+/// Confidence above which the shipped detector's finds of each class are used.
+pub const THRESHOLDS: [f32; Class::ALL.len()] = [0.4; Class::ALL.len()];
+
+impl Detection {
+    /// Whether it is confident enough to be used.
+    pub fn is_used(&self) -> bool {
+        self.confidence >= THRESHOLDS[self.class.index()]
+    }
+}
 
 impl Detector {
     /// The detector that comes with Instep (`detector.md` is its card).

@@ -12,12 +12,12 @@ use std::time::Instant;
 
 use clap::{Args, Subcommand};
 use instep_field::Field;
-use instep_perception::PerceptionError;
 use instep_perception::after::sights::{Sights, sights};
-use instep_perception::detector::{Detection, Detector, THRESHOLD};
+use instep_perception::detector::{Detection, Detector};
 use instep_perception::proximity::{self, Obstacle, Proximity};
 use instep_perception::render::{Renderer, View};
 use instep_perception::scene::Scene;
+use instep_perception::{Class, PerceptionError};
 
 use crate::failure::Failure;
 use crate::output::Output;
@@ -110,7 +110,7 @@ fn look_at(
     detector: &mut Detector,
     field: &Field,
     scene: Scene,
-    threshold: f32,
+    thresholds: &[f32; Class::ALL.len()],
     times: &mut Times,
 ) -> Result<Looked, Failure> {
     let camera = *renderer.camera();
@@ -119,10 +119,10 @@ fn look_at(
     let view = renderer.render(&scene);
     times.render.push(ms(start));
     let start = Instant::now();
-    let found = detector.detect(&view.frame, threshold)?;
+    let found = detector.detect(&view.frame, thresholds)?;
     times.detector.push(ms(start));
     let start = Instant::now();
-    let used: Vec<Detection> = found.iter().copied().filter(|d| d.confidence >= THRESHOLD).collect();
+    let used: Vec<Detection> = found.iter().copied().filter(Detection::is_used).collect();
     let radius = field.ball.radius as f32;
     let sights = sights(&camera, &scene.camera, radius, &view.frame, &view.depth, &used);
     let obstacles = proximity::nearest(&Proximity::default(), &camera, &scene.camera, &view.depth, Some(&view.frame));

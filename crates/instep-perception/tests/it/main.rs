@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "clippy.toml allows it in test functions; here the helpers are tests too")]
 
 use instep_field::Field;
-use instep_perception::detector::{Detector, THRESHOLD};
+use instep_perception::detector::Detector;
 use instep_perception::label::{Label, labels};
 use instep_perception::metric::{self, Judged};
 use instep_perception::render::Renderer;
@@ -100,10 +100,10 @@ fn the_shipped_detector_finds_what_is_there() {
         .map(|seed| {
             let scene = scene(&field, &camera, Split::Test, seed);
             let view = renderer.render(&scene);
-            let found = detector.detect(&view.frame, 0.02).unwrap();
+            let found = detector.detect(&view.frame, &[0.02; 6]).unwrap();
             Judged { found, labels: labels(&camera, &field, &scene, &view) }
         })
         .collect();
-    let of = |class| metric::row(&judged, class, THRESHOLD).map50;
+    let of = |class| metric::row(&judged, class, 0.5).map50;
     assert!(of(Class::Ball) > 0.5 && of(Class::Robot) > 0.5, "{} {}", of(Class::Ball), of(Class::Robot));
 }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use instep_perception::Camera;
-use instep_perception::detector::THRESHOLD;
+use instep_perception::detector::THRESHOLDS;
 use instep_perception::label::{self, Rect};
 use instep_perception::render::Renderer;
 use instep_perception::scene::moving::Moving;
@@ -86,7 +86,7 @@ impl LookArgs {
         let every = (self.frames as usize).div_ceil(SHOWN);
         for k in 0..self.frames {
             let t = k as f64 / RATE;
-            let looked = look_at(&mut renderer, &mut detector, &field, moving.at(t as f32), THRESHOLD, &mut times)?;
+            let looked = look_at(&mut renderer, &mut detector, &field, moving.at(t as f32), &THRESHOLDS, &mut times)?;
             let pose = &looked.scene.camera;
             ball.step(1.0 / RATE, pose, looked.sights.ball.as_ref().map(|(sight, _)| sight));
             let tracked = ball.track.as_ref().map(|track| track.position());

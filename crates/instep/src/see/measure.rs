@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::Args;
-use instep_perception::detector::{Detection, THRESHOLD};
+use instep_perception::detector::{Detection, THRESHOLDS};
 use instep_perception::metric::{self, Judged, Row};
 use instep_perception::proximity::{self, Proximity, Run};
 use instep_perception::render::Renderer;
@@ -74,7 +74,7 @@ impl EvalArgs {
         let (mut errors, mut false_frames, mut skipped) = (Vec::new(), 0, 0);
         let mut track_errors = Vec::new();
         // Down to here the curve of precision over recall is followed.
-        let least = 0.02;
+        let least = &[0.02; Class::ALL.len()];
         let bar = output::bar(self.frames, "{wide_bar} {pos}/{len} frames {eta}");
         if let Some(folder) = &self.data {
             let set = dataset::Set::open(folder)?;
@@ -109,7 +109,7 @@ impl EvalArgs {
                     }
                 }
                 if self.out.is_some() {
-                    let used: Vec<_> = looked.found.iter().copied().filter(|d| d.confidence >= THRESHOLD).collect();
+                    let used: Vec<_> = looked.found.iter().copied().filter(Detection::is_used).collect();
                     let missed = mistakes(&used, &labels);
                     pictures.push((
                         missed,
@@ -126,7 +126,7 @@ impl EvalArgs {
             track_errors = track::after_occlusion(&mut renderer, &mut detector, &field, first, sequences)?;
         }
         bar.finish_and_clear();
-        let rows = Class::ALL.map(|class| metric::row(&judged, class, THRESHOLD));
+        let rows = Class::ALL.map(|class| metric::row(&judged, class, THRESHOLDS[class.index()]));
         let evaluation = Evaluation {
             classes: Class::ALL.iter().map(|c| c.name()).zip(rows).collect(),
             overall: metric::mean(&rows),

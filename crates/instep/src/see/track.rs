@@ -3,7 +3,7 @@
 use instep_field::Field;
 use instep_perception::after::ball;
 use instep_perception::after::kalman::Track;
-use instep_perception::detector::{Detector, THRESHOLD};
+use instep_perception::detector::{Detector, THRESHOLDS};
 use instep_perception::render::Renderer;
 use instep_perception::scene::moving::Moving;
 use instep_perception::scene::random::{Split, scene};
@@ -82,7 +82,7 @@ pub(super) fn after_occlusion(
         let mut ball = BallTrack::default();
         for k in 0..RATE as u32 {
             let t = f64::from(k) / RATE;
-            let looked = look_at(renderer, detector, field, moving.at(t as f32), THRESHOLD, &mut times)?;
+            let looked = look_at(renderer, detector, field, moving.at(t as f32), &THRESHOLDS, &mut times)?;
             let hidden = !looked.view.things.iter().any(|&mark| {
                 usize::from(mark)
                     .checked_sub(1)
