@@ -18,6 +18,8 @@ const USUAL: f32 = 5.0;
 /// Cells with more of a hill than this learn rest and size: the peak's and its neighbours, where a peak may be found too.
 const NEAR: f32 = 0.3;
 
+/// Errors below this are squared, cells and units of logarithm.
+const SMOOTH: f32 = 0.05;
 /// What the cells of one label count together at most for rest and size, in peaks.
 const MOST: f32 = 3.0;
 
@@ -74,11 +76,12 @@ pub fn loss(output: &[f32], labels: &[Label], slope: &mut Vec<f32>) -> f64 {
                             for (k, (value, weight)) in wanted.into_iter().enumerate() {
                                 let at = base + k * cells + cell;
                                 let error = output[at] - value;
-                                // Smooth within a twentieth (Huber).
-                                let pull = (error / 0.05).clamp(-1.0, 1.0);
+                                // Smooth near zero (Huber).
+                                let pull = (error / SMOOTH).clamp(-1.0, 1.0);
+                                let value = pull * (error - 0.5 * SMOOTH * pull);
                                 let weight = weight * share * height / USUAL;
                                 slope[at] = weight * pull;
-                                total += f64::from(weight * error.abs());
+                                total += f64::from(weight * value);
                             }
                         }
                     }
