@@ -22,6 +22,9 @@ use crate::places;
 /// By how much a number is changed to see what follows from it.
 const NUDGE: f64 = 0.2;
 
+/// A number that settings follow from, by name, and its change.
+type Nudge = (&'static str, fn(&mut Build));
+
 /// The arguments of `instep robot show`.
 #[derive(Debug, Args)]
 pub(crate) struct Show {
@@ -102,7 +105,7 @@ fn engine<S: Derive>(subject: &Subject, build: &Build) -> Result<Engine, Failure
 }
 
 /// The numbers that settings follow from, each with its change.
-fn nudges() -> [(&'static str, fn(&mut Build)); 5] {
+fn nudges() -> [Nudge; 5] {
     [
         ("leg", |build| build.leg *= 1.0 + NUDGE),
         ("half_sole_width", |build| build.half_sole_width *= 1.0 + NUDGE),
