@@ -101,7 +101,7 @@ impl LookArgs {
             if let Some(recording) = &mut recording {
                 record(recording, t, &looked, spot)?;
             }
-            if k as usize % every == 0 {
+            if (k as usize).is_multiple_of(every) {
                 let labels = label::labels(&camera, &field, &looked.scene, &looked.view);
                 let title = format!("{t:.2} s");
                 body += &page::picture(&title, &looked.view, &looked.found, &labels, Some((&looked, spot)));

@@ -127,8 +127,7 @@ fn what_no_engine_robot_or_scenario_has_is_refused() {
     wrong(&["--requests", "0"], &["bench", "--requests", "0"]);
     wrong(&["run-up"], &["bench", "--engine", "policy", "--robot", "prestoe", "--scenario", "straight"]);
     wrong(&["policy", "nao", "policy.toml"], &["bench", "--engine", "policy", "--robot", "nao"]);
-    wrong(&["policy.toml", "nao"], &["kick", "--robot", "nao"]);
-    wrong(&["--ball"], &["kick", "--engine", "dynamic", "--robot", "nao"]);
+    wrong(&["policy.toml", "nao"], &["kick", "--engine", "policy", "--robot", "nao"]);
     wrong(&["--robot"], &["kick", "--engine", "dynamic", "--ball", "0.2,0"]);
     std::fs::write(folder.path().join("bad.jsonl"), "{\"ball\": 3}").unwrap();
     let before = listing(folder.path());
