@@ -70,7 +70,7 @@ impl Push {
 mod tests {
     use super::*;
 
-    /// A point robot that does what it is told, a ball that is shoved ahead of it.
+    /// A robot that does what it is told, a ball that is shoved ahead by the foot behind it.
     fn dribble(mut pose: Pose, mut ball: [f64; 2], goal: [f64; 2], seconds: u32) -> [f64; 2] {
         let (settings, mut push) = (PushSettings::default(), Push::default());
         for _ in 0..seconds * 50 {
@@ -84,10 +84,9 @@ mod tests {
                 }
             };
             pose = pose.then(&Pose::new(velocity[0] * 0.02, velocity[1] * 0.02, velocity[2] * 0.02));
-            let off = [ball[0] - pose.x, ball[1] - pose.y];
-            let d = off[0].hypot(off[1]);
-            if d < 0.25 {
-                ball = [pose.x + off[0] / d * 0.35, pose.y + off[1] / d * 0.35];
+            let [ahead, beside] = pose.local_from_outer(ball);
+            if (0.0..0.2).contains(&ahead) && (beside.abs() - settings.outward).abs() < 0.08 {
+                ball = pose.outer_from_local([0.35, beside]);
             }
         }
         ball

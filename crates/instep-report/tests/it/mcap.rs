@@ -105,7 +105,7 @@ fn messages_read_back() {
     assert_eq!(events[0].log_time, 250_000_000);
 
     let summary = ::mcap::Summary::read(&bytes).unwrap().unwrap();
-    assert_eq!(summary.stats.unwrap().message_count, 201);
+    assert_eq!(summary.stats.unwrap().message_count, 202);
 }
 
 #[test]

@@ -47,10 +47,7 @@ fn ours(line: &str) -> Option<Vec<&str>> {
 #[test]
 fn commands_in_docs_run() {
     let folder = tempfile::tempdir().unwrap();
-    std::fs::create_dir_all(folder.path().join("path/to")).unwrap();
     std::fs::create_dir_all(folder.path().join("out")).unwrap();
-    std::fs::copy(project().join("crates/instep/tests/models/tiny.xml"), folder.path().join("path/to/model.xml"))
-        .unwrap();
     let program = Path::new(env!("CARGO_BIN_EXE_instep")).parent().unwrap();
     let path = format!("{}:{}", program.display(), std::env::var("PATH").unwrap_or_default());
     let mut run = 0;
@@ -61,9 +58,7 @@ fn commands_in_docs_run() {
                 Command::new("sh").arg("-c").arg(line).current_dir(folder.path()).env("PATH", &path).output().unwrap();
             println!("{:6.1} s  {line}", started.elapsed().as_secs_f64());
             let code = output.status.code();
-            // `robot check` of a bare model finds something missing, and says so by its code.
-            let expected = if line.starts_with("instep robot check path/to/model.xml") { 1 } else { 0 };
-            assert_eq!(code, Some(expected), "{}: {line}\n{}", block.place, String::from_utf8_lossy(&output.stderr));
+            assert_eq!(code, Some(0), "{}: {line}\n{}", block.place, String::from_utf8_lossy(&output.stderr));
             run += usize::from(ours(line).is_some());
         }
     }
