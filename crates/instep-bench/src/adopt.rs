@@ -16,9 +16,9 @@ use crate::scenario::Scenario;
 
 /// Requests of one cell: small, so that all cores have work.
 const REQUESTS: usize = 5;
-/// An engine kicks when this share of its kicks ends upright,
+/// An engine kicks when this share of the kicks that it does not refuse ends upright,
 const UPRIGHT: f64 = 0.9;
-/// and this share hits the ball.
+/// and this share of all that is asked hits the ball.
 const HITS: f64 = 0.5;
 /// Farthest that a stand may lean after the test, rad.
 const LEAN: f64 = 0.1;
@@ -42,7 +42,8 @@ impl Kicks {
     /// Whether the engine can be said to kick with this robot.
     #[must_use]
     pub fn kicks(&self) -> bool {
-        self.upright_rate >= UPRIGHT && self.hit_rate >= HITS
+        let kicked = self.trials.saturating_sub(self.refused) as f64;
+        self.upright_rate * self.trials as f64 >= UPRIGHT * kicked - 1e-9 && self.hit_rate >= HITS
     }
 
     /// What engines are ranked by: kicks that hit and end upright, then the speed.
