@@ -258,8 +258,9 @@ impl Joint {
     }
 
     /// The angle (rad) to send a position servo that is to be at `position` (rad) with `velocity` (rad/s) and `torque` (N m) when
-    /// the command acts `delay` (s) later; see [`tell`]. Within the joint's range by what the torque needs.
-    fn servo_target(&self, position: f64, velocity: f64, torque: f64, delay: f64) -> f64 {
+    /// the command acts `delay` (s) later; see [`tell`].
+    #[must_use]
+    pub fn servo_target(&self, position: f64, velocity: f64, torque: f64, delay: f64) -> f64 {
         let Pid { p, d, .. } = self.pid;
         let friction = self.static_friction * velocity / (velocity.abs() + TURNING) + self.viscous_friction * velocity;
         let needed = (torque + friction + (d + self.motor().1) * velocity) / p;

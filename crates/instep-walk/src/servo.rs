@@ -5,8 +5,7 @@
 //! beside the model's shifts the footholds (the body turned about its support foot has its centre of mass elsewhere) and turns the ankles
 //! against it; a foot that touches the ground ends the model's step; and what its way is short of what was asked is added, slowly.
 //!
-//! Targets lead: a direct-current servo gives torque = P (q* - q) - (D + back-EMF) v, so that q* = q + (tau + friction +
-//! (D + back-EMF) v) / P moves a joint at q with v and tau. Source of the idea: own; B. Stephens, C. Atkeson, Dynamic balance force control
+//! Targets lead as those of a standing kick do ([`instep_robot::Joint::servo_target`]). Source of the idea: own; B. Stephens, C. Atkeson, Dynamic balance force control
 //! for compliant humanoid robots (IROS 2010), lead positions by torques over stiffness in a similar way.
 //!
 //! What it does not do: it knows no play, and where the model stands is not where the robot stands.
@@ -26,8 +25,6 @@ use crate::{Gait, StateEstimate, Velocity};
 
 /// Longest step of the model's integration, s.
 const LONGEST: f64 = 0.004;
-/// Speed at which friction is fed forward whole, rad/s.
-const SLIDING: f64 = 0.3;
 /// Largest tilt that is reacted to, rad.
 const TILT: f64 = 0.3;
 /// Share of the velocity that is missing over two steps that is added, and most that is added: of sqrt(g H), and rad/s.
@@ -194,10 +191,8 @@ impl Model {
         let turn = self.tilt[0] * self.settings.tilt + self.tilt[1] * self.settings.rate;
         for (j, joint) in self.robot.joints.iter().enumerate() {
             let (q, v, torque) = (self.state.q[7 + j], self.state.v[6 + j], gait.body().torques[j]);
-            let slope = joint.torque / ((1.0 - joint.corner) * joint.speed);
-            let friction = joint.static_friction * (v / SLIDING).clamp(-1.0, 1.0) + joint.viscous_friction * v;
-            let lead = (torque + friction + (joint.pid.d + slope) * v) / joint.pid.p.max(1e-3);
-            command.positions[j] = q + lead;
+            // The model is where the robot is to be when the command acts: no lead for the delay.
+            command.positions[j] = joint.servo_target(q, v, torque, 0.0);
             command.velocities[j] = v;
             command.torques[j] = 0.0;
         }

@@ -43,6 +43,18 @@ fn each_cause_has_its_own_name() {
     }
 }
 
+/// A level foot on a straight way binds NAO's ankle at 1.2 m/s of ball speed: it pitches and rises before the request is refused, and
+/// what is planned is at most a little slower than asked.
+#[test]
+fn a_foot_that_pitches_is_faster_than_a_level_one() {
+    let robot = robot("nao");
+    for (asked, least) in [(1.0, 1.0), (1.6, 1.6), (2.0, 0.88 * 2.0)] {
+        let request = KickRequest::new([0.17, -0.05], 0.0, asked);
+        let plan = engine("nao").plan(&request, &standing(&robot)).unwrap_or_else(|e| panic!("{}", e.explain(&robot)));
+        assert!((least - 1e-9..=asked + 1e-9).contains(&plan.ball_speed), "{} of {asked} m/s", plan.ball_speed);
+    }
+}
+
 #[test]
 fn a_second_request_is_refused_while_the_first_runs_and_a_fallen_robot_does_not_kick() {
     let robot = robot("nao");
