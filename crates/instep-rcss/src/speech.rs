@@ -132,7 +132,7 @@ mod tests {
             let heard = code.read(&code.write(&Message { mate, ball })).unwrap();
             prop_assert_eq!((heard.mate.number, heard.mate.able, heard.mate.role), (number, able, ROLES[role]));
             prop_assert!(heard.mate.pose.distance(&mate.pose) < 0.06);
-            prop_assert!((heard.mate.pose.heading - heading).abs() < 0.06);
+            prop_assert!(instep_field::wrap(heard.mate.pose.heading - heading).abs() < 0.06);
             prop_assert!((heard.mate.time_to_ball - far).abs() <= 0.26);
             prop_assert_eq!(heard.ball.is_some(), ball.is_some());
             if let (Some(a), Some(b)) = (heard.ball, ball) {
