@@ -77,7 +77,8 @@ fn python() -> PathBuf {
     python
 }
 
-/// The real server, as fast as its players are.
+/// The real server, which waits for its players and is never faster than the clock: what a test tells it comes at the same time of
+/// the game on an idle machine.
 pub(crate) struct Server {
     child: Child,
     /// Its port for players; the one for monitors is the next.
@@ -94,7 +95,7 @@ impl Server {
         let _ = std::fs::remove_file(folder.join("console.log"));
         let [players, monitors] = [port, port + 1].map(|port| port.to_string());
         let child = Command::new(python())
-            .args(["-m", "rcsssmj", "--no-render", "--sync", "--no-realtime"])
+            .args(["-m", "rcsssmj", "--no-render", "--sync"])
             .args(["--aport", &players, "--mport", &monitors])
             .current_dir(folder)
             .stdout(Stdio::null())
