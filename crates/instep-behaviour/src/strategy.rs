@@ -127,7 +127,7 @@ impl Default for ShotSettings {
 
 impl Default for RoleSettings {
     fn default() -> Self {
-        Self { keeper: true, hysteresis: 0.37, dwell: 0.5, defender_first: true, keeper_clears: 3.65 }
+        Self { keeper: true, hysteresis: 2.5, dwell: 1.5, defender_first: true, keeper_clears: 3.65 }
     }
 }
 

@@ -6,6 +6,8 @@ use instep_localisation::LocalisationError;
 use instep_player::PlayerError;
 use instep_sim::SimError;
 
+use crate::invariants::Breach;
+
 /// A match that cannot be played.
 #[derive(Debug, thiserror::Error)]
 pub enum MatchError {
@@ -33,6 +35,26 @@ pub enum MatchError {
         found: String,
         /// What would be right.
         expected: String,
+    },
+    /// A scenario of the rules.
+    #[error("{file}: {detail}")]
+    Scenario {
+        /// Its file.
+        file: String,
+        /// Line, or value and what would be right.
+        detail: String,
+    },
+    /// A game broke an invariant: a fault of the simulator.
+    #[error("game {game} of seed {seed} after {time:.2} s: {breach}; this is a fault of ours, please report it")]
+    Breach {
+        /// Which of the series, from 0.
+        game: usize,
+        /// The series' seed.
+        seed: u64,
+        /// s.
+        time: f64,
+        /// What.
+        breach: Breach,
     },
     /// The network.
     #[error("{what}: {source}; expected a UDP address of this machine that is free")]

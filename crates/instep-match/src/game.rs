@@ -14,6 +14,7 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::MatchError;
 use crate::ball::{Ball, Obstacle};
+use crate::invariants::{Breach, Watch};
 use crate::record::{Frame, RATE, Recording};
 use crate::referee::{Court, Event, EventKind, MOST_ROBOTS, Referee, Team, Touches};
 use crate::robot::{Robot, Status, Swing, collide};
@@ -68,6 +69,9 @@ pub struct Match {
     /// Reads a clock, s; measures decisions where it is given.
     clock: Option<fn() -> f64>,
     play_began: (PlayState, SetPlay),
+    watch: Watch,
+    /// The first breach, and when, s.
+    breach: Option<(f64, Breach)>,
 }
 
 impl Match {
@@ -99,6 +103,7 @@ impl Match {
             }
         }
         let referee = Referee::new(settings.book, settings.knockout, first);
+        let watch = Watch::new(&referee, robots.len());
         Ok(Self {
             settings,
             teams,
@@ -112,6 +117,8 @@ impl Match {
             recording: None,
             clock: None,
             play_began: (PlayState::Initial, SetPlay::None),
+            watch,
+            breach: None,
         })
     }
 
@@ -135,29 +142,9 @@ impl Match {
         &self.ball
     }
 
-    /// For scenarios: the ball as it shall be.
-    pub fn ball_mut(&mut self) -> &mut Ball {
-        &mut self.ball
-    }
-
     /// All robots, Home first.
     pub fn robots(&self) -> &[Robot] {
         &self.robots
-    }
-
-    /// For scenarios: a robot stands there, in the world.
-    pub fn place(&mut self, team: Team, number: u8, pose: Pose) {
-        for robot in self.robots.iter_mut().filter(|r| r.team == team && r.number == number) {
-            robot.place(pose);
-        }
-    }
-
-    /// For scenarios: a robot falls.
-    pub fn fall(&mut self, team: Team, number: u8) {
-        let time = self.time();
-        for robot in self.robots.iter_mut().filter(|r| r.team == team && r.number == number) {
-            robot.fall(time, &self.settings.body);
-        }
     }
 
     /// The referee.
@@ -165,9 +152,18 @@ impl Match {
         &self.referee
     }
 
-    /// The referee, for scenarios and for the official program.
-    pub fn referee_mut(&mut self) -> &mut Referee {
-        &mut self.referee
+    /// The first invariant that did not hold, and when, s.
+    pub fn breach(&self) -> Option<(f64, Breach)> {
+        self.breach
+    }
+
+    pub(crate) fn robots_mut(&mut self) -> &mut [Robot] {
+        &mut self.robots
+    }
+
+    /// A situation has been set up: what holds is told from here on.
+    pub(crate) fn begin_watch(&mut self) {
+        self.watch = Watch::new(&self.referee, self.robots.len());
     }
 
     /// What it is played with.
@@ -232,15 +228,6 @@ impl Match {
         act(&mut self.referee, &mut court)
     }
 
-    /// For scenarios: a restart for `team` at `spot`, at once.
-    pub fn start_set_play(&mut self, set_play: SetPlay, team: Team, spot: [f64; 2]) {
-        self.with_court(|referee, court| match set_play {
-            SetPlay::None => referee.kick_off(court, team),
-            SetPlay::PenaltyKick => referee.penalty_kick(court, team),
-            _ => referee.set_play(court, set_play, team, spot),
-        });
-    }
-
     fn keep_events(&mut self) {
         for event in &self.referee.events {
             match event.kind {
@@ -293,6 +280,13 @@ impl Match {
             whereabouts,
         };
         self.referee.update(&mut court);
+        if !self.referee.led {
+            let events = &self.referee.events;
+            let held = self.watch.look(time, &field, &self.ball, &self.robots, &self.referee, events);
+            if let (Err(breach), None) = (held, self.breach) {
+                self.breach = Some((time, breach));
+            }
+        }
     }
 
     /// When the referee has put the ball somewhere, everybody knows where.
@@ -402,6 +396,10 @@ impl Match {
             // A kick from the stand stands; one in the gait walks on as it did.
             let in_gait = self.teams[team].kicks.kick.get(swing.request.kick).is_some_and(|k| k.in_gait);
             robot.command = if in_gait && !swing.struck { robot.velocity } else { [0.0; 3] };
+        }
+        if let Some(walk) = robot.scripted {
+            robot.command = walk;
+            robot.swing = None;
         }
         let yaw = decision.gaze.yaw.clamp(-sight.view.neck_limit, sight.view.neck_limit);
         robot.gaze_yaw += (yaw - robot.gaze_yaw).clamp(-sight.neck_speed * dt, sight.neck_speed * dt);

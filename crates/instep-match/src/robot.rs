@@ -64,6 +64,8 @@ pub struct Robot {
     pub removals: u32,
     pub(crate) swing: Option<Swing>,
     pub(crate) command: [f64; 3],
+    /// Of a scenario: walks so, whatever it decides.
+    pub(crate) scripted: Option<[f64; 3]>,
     pub(crate) head: Player,
     pub(crate) beliefs: Beliefs,
     pub(crate) opponents: OpponentMemory,
@@ -99,6 +101,7 @@ impl Robot {
             removals: 0,
             swing: None,
             command: [0.0; 3],
+            scripted: None,
             head,
             beliefs,
             opponents: OpponentMemory::default(),

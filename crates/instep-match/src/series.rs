@@ -86,6 +86,9 @@ pub fn play(
             let began = (clocks.cpu)();
             let Result { score, shootout } = game.play();
             let cpu = (clocks.cpu)() - began;
+            if let Some((time, breach)) = game.breach() {
+                return Err(MatchError::Breach { game: index, seed, time, breach });
+            }
             done();
             let order = |[home, away]: [u32; 2]| if swapped { [away, home] } else { [home, away] };
             Ok(Game { goals: order(score), shootout: order(shootout), cpu, tally: game.tally().clone() })

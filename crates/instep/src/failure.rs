@@ -126,7 +126,10 @@ impl From<BehaviourError> for Failure {
 
 impl From<MatchError> for Failure {
     fn from(error: MatchError) -> Self {
-        Self::input(error)
+        match error {
+            MatchError::Breach { .. } => Self::other(error),
+            _ => Self::input(error),
+        }
     }
 }
 

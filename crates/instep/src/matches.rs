@@ -1,8 +1,10 @@
 //! `instep match`: games in the game simulator; how two strategies compare, and one game to look at. With `--physics` a game, or
 //! a scene, of whole players in MuJoCo.
 
+mod lead;
 mod page;
 mod physics;
+mod rules;
 mod space;
 
 use std::fmt::Write;
@@ -14,8 +16,9 @@ use std::time::Instant;
 use clap::Args;
 use instep_behaviour::{KickTable, Strategy, Which};
 use instep_bench::cpu::thread_seconds;
+use instep_field::Field;
 use instep_match::series::{self, Clocks, NORMAL_95, NORMAL_99, Summary};
-use instep_match::{BodySettings, MatchSettings, TeamSetup};
+use instep_match::{BodySettings, MatchSettings, Recording, TeamSetup};
 
 use crate::failure::Failure;
 use crate::output::{self, Output, Paint};
@@ -60,6 +63,11 @@ pub(crate) struct Match {
     /// The same as out/match/replay.html, opened in the browser
     #[arg(long, conflicts_with = "save")]
     watch: bool,
+    /// Play a scenario of the rules (scenarios/rules/NAME.toml) in place of games: what the referee had to do, and did
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["physics", "gamecontroller"])]
+    scenario: Option<PathBuf>,
+    #[command(flatten)]
+    led: lead::Led,
     #[command(flatten)]
     in_physics: physics::InPhysics,
 }
@@ -96,12 +104,19 @@ impl Match {
         };
         let (red, blue) = (setup("--red", &self.red)?, setup("--blue", &self.blue)?);
         let settings = Arc::new(settings);
-        let replay = self.save.as_deref().map(|file| files::with_ending(file, "html"));
-        let replay = replay.or_else(|| self.watch.then(|| Path::new("out/match/replay.html").to_owned()));
-        if let Some(file) = &replay {
-            files::check_file(file)?;
-            self.replay(file, &settings, &red, &blue)?;
-            output.remark(|paint| format!("{} {}", paint.faint("replay of the first game:"), file.display()));
+        if let Some(file) = &self.scenario {
+            return self.play_scenario(&places::rule(file)?, &red, output);
+        }
+        if let Some(address) = self.led.gamecontroller {
+            return self.play_led(address, &settings, [red, blue], output);
+        }
+        if let Some(file) = self.replay_file()? {
+            let (mut game, _) = series::game(&settings, &red, &blue, self.seed, 0)?;
+            game.record();
+            game.play();
+            let recording = game.take_recording().unwrap_or_default();
+            let names = [red.strategy.name.as_str(), blue.strategy.name.as_str()];
+            self.write_replay(&file, &recording, &settings.field, names, output)?;
         }
         let bar = output::bar(self.games, "{pos}/{len} games {wide_bar} {eta}");
         let clocks = Clocks { decision: clock, cpu: thread_seconds };
@@ -113,25 +128,32 @@ impl Match {
         Ok(ExitCode::SUCCESS)
     }
 
-    /// Plays the first game once more, recorded, and writes it as a page.
-    fn replay(
+    /// Where a replay is wanted, if one is: a file that can be written.
+    fn replay_file(&self) -> Result<Option<PathBuf>, Failure> {
+        let file = self.save.as_deref().map(|file| files::with_ending(file, "html"));
+        let file = file.or_else(|| self.watch.then(|| Path::new("out/match/replay.html").to_owned()));
+        if let Some(file) = &file {
+            files::check_file(file)?;
+        }
+        Ok(file)
+    }
+
+    /// Writes a recorded game as a page, and opens it where the user wants to watch.
+    fn write_replay(
         &self,
         file: &Path,
-        settings: &Arc<MatchSettings>,
-        red: &TeamSetup,
-        blue: &TeamSetup,
+        recording: &Recording,
+        field: &Field,
+        names: [&str; 2],
+        output: &Output,
     ) -> Result<(), Failure> {
-        let (mut game, _) = series::game(settings, red, blue, self.seed, 0)?;
-        game.record();
-        game.play();
-        let Some(recording) = game.take_recording() else { return Ok(()) };
-        let names = [red.strategy.name.as_str(), blue.strategy.name.as_str()];
-        let page = page::page(&recording, &settings.field, names).map_err(Failure::other)?;
+        let page = page::page(recording, field, names).map_err(Failure::other)?;
         let mut batch = files::Batch::default();
         let staged = batch.stage(file)?;
         std::fs::write(&staged, page)
             .map_err(|e| Failure::input(format!("{}: cannot be written: {e}", file.display())))?;
         batch.commit()?;
+        output.remark(|paint| format!("{} {}", paint.faint("replay:"), file.display()));
         if self.watch {
             page::open(file);
         }

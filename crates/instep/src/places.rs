@@ -166,6 +166,15 @@ pub(crate) fn strategy(flag: &str, path: &Path) -> Result<PathBuf, Failure> {
     existing_file(flag, found.as_deref().unwrap_or(path), "a strategy (TOML)")
 }
 
+/// The scenario of the rules that the user means: a path, or a shipped one as `scenarios/rules/<name>.toml`.
+///
+/// # Errors
+/// When there is none.
+pub(crate) fn rule(path: &Path) -> Result<PathBuf, Failure> {
+    let found = if path.is_relative() { find(path) } else { None };
+    existing_file("--scenario", found.as_deref().unwrap_or(path), "a scenario of the rules (TOML)")
+}
+
 /// Names of the robots that can be found.
 fn robots() -> Vec<String> {
     let mut names: Vec<String> = robots_of_user()
