@@ -15,7 +15,7 @@ use crate::game::{Match, TeamSetup};
 use crate::record::Recording;
 use crate::referee::{EventKind, Penalty, Team};
 use crate::robot::Status;
-use crate::{MatchError, MatchSettings};
+use crate::{MatchError, MatchSettings, RuleBook};
 
 /// How exactly a place must be met, m: a ball that was placed may have rolled for one step.
 const PLACE: f64 = 0.05;
@@ -212,9 +212,22 @@ impl Scenario {
     /// # Errors
     /// As [`MatchSettings::new`] and [`Match::new`].
     pub fn play(&self, team: &TeamSetup) -> Result<(Vec<Check>, Recording), MatchError> {
+        self.play_by(team, |_| ())
+    }
+
+    /// The same by another book: tests change a number and see that the scenario tells.
+    ///
+    /// # Errors
+    /// As [`Scenario::play`].
+    pub fn play_by(
+        &self,
+        team: &TeamSetup,
+        change: impl FnOnce(&mut RuleBook),
+    ) -> Result<(Vec<Check>, Recording), MatchError> {
         let most = self.robot.iter().map(|r| usize::from(r.number)).max().unwrap_or(1);
         let mut settings = MatchSettings::new(&self.rules, Some(most))?;
         settings.knockout = self.knockout;
+        change(&mut settings.book);
         if let Some(chance) = self.get_up_chance {
             settings.body.get_up_chance = chance;
         }

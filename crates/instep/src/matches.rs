@@ -30,9 +30,9 @@ pub(crate) struct Match {
     /// The league's rules and field: adult-2024, kid, hsl-s, hsl-m, hsl-l, simulation, fifa, or a field's TOML file
     #[arg(long, value_name = "RULES", default_value = "adult-2024")]
     rules: String,
-    /// Red's strategy, a file [default: Instep's own]; with --physics how many play [default: 2]
+    /// Red's strategy, a file [default: Instep's own]; given again, one series each; with --physics how many play [default: 2]
     #[arg(long, value_name = "FILE|N")]
-    red: Option<PathBuf>,
+    red: Vec<PathBuf>,
     /// Blue's likewise
     #[arg(long, value_name = "FILE|N")]
     blue: Option<PathBuf>,
@@ -78,6 +78,28 @@ fn clock() -> f64 {
     START.elapsed().as_secs_f64()
 }
 
+/// What a series is measured with.
+pub(crate) const CLOCKS: Clocks = Clocks { decision: clock, cpu: thread_seconds };
+
+/// The settings with a robot's walk, and its kicks from the table in `kicks`; `robot` absent: nao on small fields, else
+/// artemis.
+///
+/// # Errors
+/// When the table cannot be used.
+pub(crate) fn of_robot(
+    mut settings: MatchSettings,
+    robot: Option<&str>,
+    engine: Option<&str>,
+    kicks: &Path,
+) -> Result<(Arc<MatchSettings>, Arc<KickTable>), Failure> {
+    let small = matches!(settings.field.name.as_str(), "kid" | "hsl-s");
+    let robot = robot.unwrap_or(if small { "nao" } else { "artemis" });
+    settings.body = BodySettings::for_robot(robot);
+    let path = places::kicks(kicks)?;
+    let table = KickTable::load(&path)?.only(Which { engine, robot }, &path.display().to_string())?;
+    Ok((Arc::new(settings), Arc::new(table)))
+}
+
 impl Match {
     /// Runs the command.
     ///
@@ -89,21 +111,16 @@ impl Match {
         }
         let mut settings = MatchSettings::new(&self.rules, self.players)?;
         settings.knockout = self.knockout;
-        let small = matches!(settings.field.name.as_str(), "kid" | "hsl-s");
-        let robot = self.robot.as_deref().unwrap_or(if small { "nao" } else { "artemis" });
-        settings.body = BodySettings::for_robot(robot);
-        let path = places::kicks(&self.kicks)?;
-        let which = Which { engine: self.engine.as_deref(), robot };
-        let kicks = Arc::new(KickTable::load(&path)?.only(which, &path.display().to_string())?);
-        let setup = |flag: &str, path: &Option<PathBuf>| -> Result<TeamSetup, Failure> {
+        let (settings, kicks) = of_robot(settings, self.robot.as_deref(), self.engine.as_deref(), &self.kicks)?;
+        let setup = |flag: &str, path: Option<&PathBuf>| -> Result<TeamSetup, Failure> {
             let strategy = match path {
                 Some(path) => Strategy::load(&places::strategy(flag, path)?)?,
                 None => Strategy::default(),
             };
             Ok(TeamSetup { strategy: Arc::new(strategy), kicks: kicks.clone() })
         };
-        let (red, blue) = (setup("--red", &self.red)?, setup("--blue", &self.blue)?);
-        let settings = Arc::new(settings);
+        let blue = setup("--blue", self.blue.as_ref())?;
+        let red = setup("--red", self.red.first())?;
         if let Some(file) = &self.scenario {
             return self.play_scenario(&places::rule(file)?, &red, output);
         }
@@ -118,13 +135,27 @@ impl Match {
             let names = [red.strategy.name.as_str(), blue.strategy.name.as_str()];
             self.write_replay(&file, &recording, &settings.field, names, output)?;
         }
-        let bar = output::bar(self.games, "{pos}/{len} games {wide_bar} {eta}");
-        let clocks = Clocks { decision: clock, cpu: thread_seconds };
-        let games = series::play(&settings, &red, &blue, self.games as usize, self.seed, clocks, || bar.inc(1))?;
+        let mut reds = vec![red];
+        for path in self.red.iter().skip(1) {
+            reds.push(setup("--red", Some(path))?);
+        }
+        let bar = output::bar(self.games * reds.len() as u64, "{pos}/{len} games {wide_bar} {eta}");
+        let mut all = Vec::new();
+        for red in &reds {
+            let games = series::play(&settings, red, &blue, self.games as usize, self.seed, CLOCKS, || bar.inc(1))?;
+            all.push((red.strategy.name.as_str(), Summary::of(&games)));
+        }
         bar.finish_and_clear();
-        let summary = Summary::of(&games);
-        let names = [red.strategy.name.as_str(), blue.strategy.name.as_str()];
-        output.show(&json(&summary, names, self), |paint| text(&summary, names, &settings, paint))?;
+        let blue = blue.strategy.name.as_str();
+        let mut objects: Vec<_> = all.iter().map(|(red, summary)| json(summary, [red, blue], self)).collect();
+        let object = match objects.len() {
+            1 => objects.swap_remove(0),
+            _ => serde_json::json!({ "series": objects }),
+        };
+        output.show(&object, |paint| {
+            let texts: Vec<_> = all.iter().map(|(red, summary)| text(summary, [red, blue], &settings, paint)).collect();
+            texts.join("\n")
+        })?;
         Ok(ExitCode::SUCCESS)
     }
 

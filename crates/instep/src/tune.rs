@@ -1,4 +1,7 @@
-//! `instep tune`: an engine's settings for a robot, found by CMA-ES; stopped and resumed at will.
+//! `instep tune`: an engine's settings for a robot, found by CMA-ES; stopped and resumed at will. With `--against` a
+//! strategy's numbers.
+
+mod strategy;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -17,15 +20,21 @@ use crate::{files, places, worlds};
 /// The arguments of `instep tune`.
 #[derive(Debug, Args)]
 pub(crate) struct Tune {
-    /// The engine: any that `instep bench` knows
+    /// The engine: any that `instep bench` knows; with --against a strategy's file, or "default"
     engine: String,
     /// A robot's name, or the path of its folder or robot.toml
     #[arg(long, value_name = "ROBOT", default_value = "nao")]
     robot: String,
+    /// Fit a strategy instead: the one that it shall win against, a file or "default"
+    #[arg(long, value_name = "STRATEGY", conflicts_with_all = ["robot", "objective", "world", "resume"])]
+    against: Option<String>,
+    /// With --against: the league's rules and field
+    #[arg(long, value_name = "RULES", default_value = "adult-2024", requires = "against")]
+    rules: String,
     /// What is wanted
     #[arg(long, value_enum, default_value_t = Wanted::Distance)]
     objective: Wanted,
-    /// Which numbers may change, between which bounds, measured on what [default: tuning/ENGINE.toml]
+    /// Which numbers may change, between which bounds, measured on what [default: tuning/ENGINE.toml, tuning/strategy.toml]
     #[arg(long, value_name = "FILE")]
     tuning: Option<PathBuf>,
     /// Seed of the search and its cases
@@ -85,6 +94,9 @@ impl Tune {
     /// # Errors
     /// When a name is not known, a file cannot be used, nothing can be measured, or a simulation diverges.
     pub(crate) fn run(self, output: &Output) -> Result<ExitCode, Failure> {
+        if let Some(against) = &self.against {
+            return strategy::run(&self, against, output);
+        }
         let subject = Subject::of(places::robot(&self.robot)?)?;
         let default = subject.default_world();
         let world = worlds::asked(self.world.as_deref(), &default)?;

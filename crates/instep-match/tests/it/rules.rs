@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use instep_behaviour::{KickTable, Strategy, Which};
-use instep_match::TeamSetup;
 use instep_match::scenario::Scenario;
+use instep_match::{RuleBook, TeamSetup};
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
@@ -33,6 +33,38 @@ fn every_rule_is_judged_as_its_scenario_says() {
         faults.extend(checks.iter().filter_map(|c| Some(format!("{name}: {}: {}", c.what, c.fault.as_ref()?))));
     }
     assert!(faults.is_empty(), "{}", faults.join("\n"));
+}
+
+/// Each number that the referee judges by is held by a scenario: with another one, that scenario fails.
+#[test]
+fn another_book_is_found_out() {
+    type Change = fn(&mut RuleBook);
+    let changes: [(&str, Change); 18] = [
+        ("kick-off", |book| book.ready += 1.0),
+        ("kick-off", |book| book.set += 1.0),
+        ("kick-off-not-taken", |book| book.rules.ball_free_after += 1.0),
+        ("kick-off-no-direct-goal", |book| book.rules.direct_goal_from_kick_off = true),
+        ("throw-in-not-taken", |book| book.set_play -= 1.0),
+        ("goal-kick-opponent-in-area", |book| book.clear -= 1.0),
+        ("free-kick-opponent-too-near", |book| book.clear += 1.0),
+        ("penalty-kick-not-taken", |book| book.rules.penalty_kick = Some(59.0)),
+        ("pushing", |book| book.pushing += 3.0),
+        ("ball-holding", |book| book.holding[0] -= 1.0),
+        ("ball-holding-keeper", |book| book.holding[1] += 1.0),
+        ("does-not-get-up", |book| book.incapable += 1.0),
+        ("three-tries-to-get-up", |book| book.rules.get_up_tries = Some(4)),
+        ("stuck-local", |book| book.stuck_local += 1.0),
+        ("stuck-global", |book| book.stuck_global -= 1.0),
+        ("removal-repeated", |book| book.repeat -= 1.0),
+        ("extra-time", |book| book.extra_half = None),
+        ("mercy", |book| book.mercy = Some(11)),
+    ];
+    let (team, scenarios) = (team(), scenarios());
+    for (i, (name, change)) in changes.into_iter().enumerate() {
+        let (_, scenario) = scenarios.iter().find(|(n, _)| n == name).unwrap();
+        let (checks, _) = scenario.play_by(&team, change).unwrap();
+        assert!(checks.iter().any(|c| c.fault.is_some()), "{name} does not see change {i}");
+    }
 }
 
 #[test]

@@ -92,7 +92,7 @@ struct Played {
 }
 
 fn game(args: &Match, robot: &Arc<Robot>, player: &PlayerSettings, output: &Output) -> Result<ExitCode, Failure> {
-    let counts = [players("--red", args.red.as_ref())?, players("--blue", args.blue.as_ref())?];
+    let counts = [players("--red", args.red.first())?, players("--blue", args.blue.as_ref())?];
     let settings = Arc::new(MatchSettings::new(&args.rules, None)?);
     let minutes = args.in_physics.minutes.unwrap_or(f64::INFINITY);
     if !(minutes > 0.0 && (minutes <= LONGEST || args.in_physics.minutes.is_none())) {

@@ -80,3 +80,44 @@ fn a_small_tuning_leaves_settings_a_report_and_a_checkpoint() {
     assert!(read("settings.toml").contains("[kick]") && read("report.html").contains("<html"));
     assert!(read("checkpoint.json").contains("\"generation\":1"));
 }
+
+#[test]
+fn a_strategy_is_fitted_against_another() {
+    let folder = tempfile::tempdir().unwrap();
+    let tuning = GOOD
+        .replace("\"straight\"", "\"match\"")
+        .replace("kick.time", "shot.most_turn")
+        .replace("[0.25, 0.4]", "[0.5, 3.0]");
+    write(folder.path(), &tuning);
+    let fit = ["tune", "default", "--tuning", "t.toml", "--trials", "2", "--out", "o", "--json", "--against"];
+    let tuned = object(&instep(folder.path(), &[&fit[..], &["default"]].concat()));
+    assert_eq!((&tuned["names"][0], &tuned["against"]), (&"shot.most_turn".into(), &"default".into()));
+    assert_eq!(tuned["measured"]["after"]["games"], 2);
+    let found = std::fs::read_to_string(folder.path().join("o/strategy.toml")).unwrap();
+    assert!(found.contains("name = \"default-tuned\""), "{found}");
+    // What was found plays.
+    let played = ["match", "--red", "o/strategy.toml", "--games", "1", "--json"];
+    assert_eq!(object(&instep(folder.path(), &played))["red"]["strategy"], "default-tuned");
+
+    let before = listing(folder.path());
+    assert_refused(
+        &instep(folder.path(), &[&fit[..], &["none.toml"]].concat()),
+        &["none.toml", "--against"],
+        folder.path(),
+        &before,
+    );
+    write(folder.path(), &tuning.replace("[0.5, 3.0]", "[0.5, 9.0]"));
+    assert_refused(
+        &instep(folder.path(), &[&fit[..], &["default"]].concat()),
+        &["t.toml", "shot.most_turn", "9"],
+        folder.path(),
+        &listing(folder.path()),
+    );
+    write(folder.path(), GOOD);
+    assert_refused(
+        &instep(folder.path(), &[&fit[..], &["default"]].concat()),
+        &["t.toml", "straight", "\"match\""],
+        folder.path(),
+        &listing(folder.path()),
+    );
+}
