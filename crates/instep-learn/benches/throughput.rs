@@ -17,6 +17,7 @@ use instep_motion::reference::Reference;
 use instep_robot::Robot;
 use instep_robot::control::JointCommand;
 use instep_sim::BallState;
+use rand::SeedableRng as _;
 use rayon::prelude::*;
 
 /// Control steps a second that a laptop should reach on two cores.
@@ -79,7 +80,7 @@ fn time(threads: usize, work: impl Fn(usize) + Sync + Send) -> f64 {
 /// Steps a world under the reference's own commands.
 fn physics(scene: &Scene, steps: usize) {
     let mut follower = scene.follower().clone();
-    let mut world = scene.world().unwrap();
+    let mut world = scene.world(&mut rand_chacha::ChaCha8Rng::from_seed([1; 32])).unwrap();
     let mut command = JointCommand::zeros(scene.robot.joints.len());
     let mut state = instep_kick::track::TrackState::default();
     let far = scene.settings.world.step;

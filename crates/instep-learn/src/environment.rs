@@ -115,16 +115,20 @@ impl Scene {
         WorldSettings {
             step: StepSettings { tick: far, far, near: far / per_far, ..default },
             sensors: self.settings.world.sensors,
+            drives: self.settings.world.drives,
+            senses: self.settings.world.senses,
             ..WorldSettings::default()
         }
     }
 
-    /// A world of the training.
+    /// A world of the training, drawn from `rng` as far as they differ.
     ///
     /// # Errors
     /// When it cannot be made.
-    pub fn world(&self) -> Result<World, LearnError> {
-        let mut world = World::new(Arc::clone(&self.robot), &self.world_settings())?;
+    pub fn world(&self, rng: &mut ChaCha8Rng) -> Result<World, LearnError> {
+        let mut settings = self.world_settings();
+        self.settings.world.spread.draw(&mut settings, rng);
+        let mut world = World::new(Arc::clone(&self.robot), &settings)?;
         world.make_cheap(self.settings.world.solver_iterations, self.settings.world.solver_tolerance);
         Ok(world)
     }
@@ -203,9 +207,9 @@ impl Environment {
     /// # Errors
     /// When the world cannot be made.
     pub fn new(scene: Arc<Scene>, seed: u64, index: usize) -> Result<Self, LearnError> {
-        let mut world = scene.world()?;
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(index as u64 + 1);
+        let mut world = scene.world(&mut rng)?;
         let follower = scene.follower.clone();
         Ok(Self {
             suite: SensorSuite::new(&mut world, 0),

@@ -3,7 +3,9 @@
 
 use instep_kick::policy::{Activation, FollowerSettings};
 use instep_robot::Robot;
+use instep_sim::settings::Fidelity;
 use instep_sim::start::StartErrors;
+use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
@@ -257,8 +259,44 @@ pub struct WorldSettings {
     pub solver_tolerance: f64,
     /// Whether the ball lies at its place; without, it lies far away.
     pub ball: bool,
-    /// Noise and delay of the sensors.
+    /// Noise and delay of the sensors beyond the robot's own.
     pub sensors: instep_sim::settings::SensorNoise,
+    /// Whether drives are as `robot.toml` has them.
+    pub drives: Fidelity,
+    /// Whether senses are as `robot.toml` has them.
+    pub senses: Fidelity,
+    /// How far apart the environments' worlds are.
+    pub spread: Spread,
+}
+
+/// How far the worlds of a training's environments differ: each environment draws its own once, evenly. Zero by default.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Spread {
+    /// Most by which the factor on every link's mass and inertia differs from 1.
+    pub mass: f64,
+    /// Most by which the centre of mass of the base is shifted on each horizontal axis, m.
+    pub base_shift: f64,
+    /// Most by which the friction of the ground is lower or higher.
+    pub friction: f64,
+    /// Most by which all sensors are late beyond their own delay, s.
+    pub delay: f64,
+    /// Most by which the restitution of foot and ball is lower or higher.
+    pub restitution: f64,
+}
+
+impl Spread {
+    /// The world of one environment, drawn from `rng` round `world`.
+    pub(crate) fn draw(&self, world: &mut instep_sim::settings::WorldSettings, rng: &mut ChaCha8Rng) {
+        let mut within = |most: f64| if most > 0.0 { rng.random_range(-most..=most) } else { 0.0 };
+        world.model_error.mass += within(self.mass);
+        for axis in 0..2 {
+            world.model_error.base_shift[axis] += within(self.base_shift);
+        }
+        world.pitch.friction += within(self.friction);
+        world.impact.restitution += within(self.restitution);
+        world.sensors.delay += within(self.delay).abs();
+    }
 }
 
 impl Default for WorldSettings {
@@ -269,6 +307,9 @@ impl Default for WorldSettings {
             solver_tolerance: 1e-5,
             ball: false,
             sensors: instep_sim::settings::SensorNoise::default(),
+            drives: Fidelity::AsBuilt,
+            senses: Fidelity::AsBuilt,
+            spread: Spread::default(),
         }
     }
 }
@@ -400,6 +441,16 @@ impl LearnSettings {
         check("world.solver_iterations", iterations as f64, (1..=1000).contains(&iterations), "1 to 1000")?;
         let tolerance = self.world.solver_tolerance;
         check("world.solver_tolerance", tolerance, (0.0..=1e-2).contains(&tolerance), "in [0, 0.01]")?;
+        let spread = &self.world.spread;
+        for (name, value, most) in [
+            ("mass", spread.mass, 0.5),
+            ("base_shift", spread.base_shift, 0.1),
+            ("friction", spread.friction, 0.6),
+            ("delay", spread.delay, 0.1),
+            ("restitution", spread.restitution, 0.25),
+        ] {
+            check(&format!("world.spread.{name}"), value, (0.0..=most).contains(&value), &format!("0 to {most}"))?;
+        }
         let period = self.follower.period;
         check("follower.period", period, (0.001..=0.1).contains(&period), "0.001 to 0.1 s")?;
         let scale = self.follower.scale;

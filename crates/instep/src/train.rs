@@ -196,14 +196,8 @@ impl Train {
                 Task::Track => LearnSettings::default(),
                 Task::Ball => LearnSettings::ball(),
             });
-            if let Some(policy) = policy.as_ref().filter(|_| self.settings.is_none()) {
-                // The part of the clip and the shape of the network are the policy's.
-                let [from, to] = policy.header.window;
-                (settings.clip.from, settings.clip.to) = (Some(from), Some(to));
-                settings.follower = policy.header.follower.clone();
-                settings.network.activation = policy.network.activation;
-                let hidden = policy.network.layers.len().saturating_sub(1);
-                settings.network.actor = policy.network.layers[..hidden].iter().map(|layer| layer.bias.len()).collect();
+            if let Some(policy) = &policy {
+                fit(&mut settings, policy);
             }
             let training = Training::new(robot, reference, &name, settings, self.seed, self.budget, policy.as_ref())?;
             return Ok(training);
@@ -244,6 +238,23 @@ impl Train {
         put(&files.card, card(training).as_bytes())?;
         page(training).save(batch.stage(&files.report)?)?;
         batch.commit()
+    }
+}
+
+/// The part of the clip, what is seen and done, and the shape of the network are the policy's, unless the settings say otherwise.
+fn fit(settings: &mut LearnSettings, policy: &Policy) {
+    let default = LearnSettings::default();
+    if settings.clip == default.clip {
+        let [from, to] = policy.header.window;
+        (settings.clip.from, settings.clip.to) = (Some(from), Some(to));
+    }
+    if settings.follower == default.follower {
+        settings.follower = policy.header.follower.clone();
+    }
+    if settings.network == default.network {
+        settings.network.activation = policy.network.activation;
+        let hidden = policy.network.layers.len().saturating_sub(1);
+        settings.network.actor = policy.network.layers[..hidden].iter().map(|layer| layer.bias.len()).collect();
     }
 }
 
