@@ -136,7 +136,8 @@ fn peaks(output: &[f32], thresholds: &[f32; Class::ALL.len()]) -> Vec<Detection>
                 all += say;
             }
             let [left, top, right, low] = edges.map(|edge| edge / all);
-            let rect = Rect { left, top, right, low }.meet(&frame);
+            let rect = Rect { left, top, right, low };
+            let rect = if class == Class::GoalPost { rect.widened() } else { rect }.meet(&frame);
             if rect.area() > 0.0 {
                 found.push(Detection { class, rect, confidence, team: None });
             }

@@ -1,6 +1,7 @@
 //! What is in a rendered frame: boxes from the truth behind its pixels.
 //!
-//! Ball, posts and robots get the box of their visible pixels. An intersection gets a box around its point whose width is
+//! Ball, posts and robots get the box of their visible pixels; a post's is widened to [`LEAST_WIDTH`], as people draw it: one of
+//! two pixels is a matter of luck. An intersection gets a box around its point whose width is
 //! what 0.6 m across the line of sight takes at its distance, and whose height is 0.6 of that, at least 8 pixels: marks on
 //! the ground have no extent of their own, and people who label them draw such boxes. What is too small, too far, worn
 //! or too much hidden to be asked for is listed as ignored: finding it is neither right nor wrong.
@@ -91,6 +92,18 @@ pub const LANDMARK_RANGE: f32 = 6.5;
 /// Width of an intersection's box across the line of sight, m.
 pub const LANDMARK_WIDTH: f32 = 0.6;
 
+/// Least width of a post's box, pixels: one and a half cells of the network's maps.
+pub const LEAST_WIDTH: f32 = 6.0;
+
+impl Rect {
+    /// Widened about its middle to [`LEAST_WIDTH`], where it is narrower.
+    #[must_use]
+    pub fn widened(self) -> Rect {
+        let more = (LEAST_WIDTH - self.width()).max(0.0) / 2.0;
+        Rect { left: self.left - more, right: self.right + more, ..self }
+    }
+}
+
 /// The box of an intersection whose point falls on a pixel, `depth` m ahead.
 pub fn intersection_rect(camera: &Camera, pixel: [f32; 2], depth: f32) -> Rect {
     let width = (camera.focal() * LANDMARK_WIDTH / depth.max(0.1)).max(12.0);
@@ -140,6 +153,7 @@ fn boxes(camera: &Camera, scene: &Scene, view: &View) -> Vec<Label> {
         pixels: usize,
     }
     let none = Extent { left: usize::MAX, top: usize::MAX, right: 0, low: 0, pixels: 0 };
+    let frame = Rect { left: 0.0, top: 0.0, right: camera.width as f32, low: camera.height as f32 };
     let mut extents = vec![none; scene.things.len()];
     for (row, marks) in view.things.chunks_exact(camera.width).enumerate() {
         for (column, &mark) in marks.iter().enumerate() {
@@ -168,6 +182,7 @@ fn boxes(camera: &Camera, scene: &Scene, view: &View) -> Vec<Label> {
             };
             let place = scene.camera.camera_from_world(thing.position);
             let ignored = !asked_for(camera, thing, place, &rect, extent.pixels);
+            let rect = if thing.class == Class::GoalPost { rect.widened().meet(&frame) } else { rect };
             Label { class: thing.class, rect, team: thing.team, ignored, place: place.into() }
         })
         .collect()

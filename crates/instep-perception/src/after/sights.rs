@@ -6,7 +6,11 @@ use super::{ball, depth, select};
 use crate::camera::{Camera, CameraPose};
 use crate::class::{Class, Team};
 use crate::detector::Detection;
+use crate::label::LANDMARK_RANGE;
 use crate::picture::{Depth, Frame};
+
+/// Intersections nearer to each other than this are one, m.
+const ONE: f32 = 0.5;
 
 /// Something that stands on the ground, in the robot's frame (x ahead, y left), m.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -82,6 +86,16 @@ pub fn sights(
             Class::GoalPost | Class::Robot => by_depth(),
         };
         let Some((place, deviation)) = place else { continue };
+        if detection.class.is_intersection() {
+            // Farther ones nobody taught it; and a corner is not a crossing too: the more confident one is believed.
+            let double = |(_, _, sight): &(f32, f32, Sight)| {
+                let [x, y] = sight.position;
+                sight.class.is_intersection() && (x - place.x).hypot(y - place.y) < ONE
+            };
+            if place.xy().norm() > LANDMARK_RANGE || landmarks.iter().any(double) {
+                continue;
+            }
+        }
         let (class, confidence, team) = (detection.class, detection.confidence, detection.team);
         let sight = Sight { class, confidence, position: [place.x, place.y], deviation, team };
         if class == Class::Robot {

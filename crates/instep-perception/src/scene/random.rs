@@ -38,6 +38,9 @@ impl Default for Mount {
     }
 }
 
+/// How a head looks down at a ball before its feet, rad below the horizon.
+const DOWN: [f32; 2] = [0.6, 1.15];
+
 /// One random scene of `split`, seen by an adult-size humanoid.
 pub fn scene(field: &Field, camera: &Camera, split: Split, seed: u64) -> Scene {
     scene_from(&Mount::default(), field, camera, split, seed)
@@ -51,6 +54,9 @@ pub fn scene_from(mount: &Mount, field: &Field, camera: &Camera, split: Split, s
     rng.set_stream(if test { 2 } else { 1 });
     let rng = &mut rng;
     let look = look(camera, test, rng);
+    // To learn from: a head that looks down at a ball before its feet. The test keeps to what it has always shown.
+    let down = !test && rng.random_bool(0.25);
+    let mount = if down { &Mount { pitch: DOWN, ..*mount } } else { mount };
     let pose = camera_pose(mount, field, rng);
     let mut scene = Scene::new(pose, look, rng.random());
     let white = paint_white(rng);
@@ -58,7 +64,11 @@ pub fn scene_from(mount: &Mount, field: &Field, camera: &Camera, split: Split, s
     scene.add_goals(field, post, Paint::Plain(white), net);
     robots(&mut scene, field, test, rng);
     surroundings(&mut scene, field, test, rng);
-    ball(&mut scene, field, test, rng);
+    if down {
+        own_feet(&mut scene, rng);
+    }
+    let near = if down { [0.12, 1.3] } else { [0.5, 9.0] };
+    ball(&mut scene, field, test, near, rng);
     scene
 }
 
@@ -281,17 +291,34 @@ fn surroundings(scene: &mut Scene, field: &Field, test: bool, rng: &mut ChaCha8R
     }
 }
 
+/// The feet and shanks of the robot that carries the camera: no robot to be found.
+fn own_feet(scene: &mut Scene, rng: &mut ChaCha8Rng) {
+    let (s, c) = scene.camera.yaw().sin_cos();
+    let paint = Paint::Plain(if rng.random_bool(0.7) { grey(rng) } else { any(rng) });
+    for side in [-1.0, 1.0] {
+        let (x, y) = (rng.random_range(-0.1..0.4f32), side * rng.random_range(0.06..0.14f32));
+        let [px, py] = [scene.camera.position.x + c * x - s * y, scene.camera.position.y + s * x + c * y];
+        let turn = Rotation3::from_euler_angles(0.0, 0.0, scene.camera.yaw() + rng.random_range(-0.3..0.3));
+        let half = [rng.random_range(0.08..0.14), rng.random_range(0.03..0.06), 0.03];
+        let z = rng.random_range(0.03..0.12f32);
+        let foot = block([px, py, z], half, paint);
+        scene.solids.push(Solid { rotation: *turn.matrix(), ..foot });
+        let shank = Solid { shape: Shape::Capsule(rng.random_range(0.03..0.05), 0.15), ..foot };
+        scene.solids.push(Solid { position: Vector3::new(px - 0.03 * c, py - 0.03 * s, z + 0.2), ..shank });
+    }
+}
+
 /// An upright box of the surroundings.
 fn block(place: [f32; 3], half: [f32; 3], paint: Paint) -> Solid {
     Solid { shape: Shape::Box(half), position: place.into(), rotation: nalgebra::Matrix3::identity(), paint, thing: 0 }
 }
 
-fn ball(scene: &mut Scene, field: &Field, test: bool, rng: &mut ChaCha8Rng) {
+fn ball(scene: &mut Scene, field: &Field, test: bool, [near, far]: [f32; 2], rng: &mut ChaCha8Rng) {
     if rng.random_bool(0.15) {
         return;
     }
     let radius = field.ball.radius as f32;
-    let at = seen_place(scene, 0.5, 9.0, rng);
+    let at = seen_place(scene, near, far, rng);
     if !field.contains([f64::from(at[0]), f64::from(at[1])], 0.9) {
         return;
     }
