@@ -129,6 +129,11 @@ impl Arena {
             let others = others.collect();
             seat.look(&self.world, &others);
         }
+        // What costs is what the network does.
+        match &mut self.seats[..] {
+            [seat] => seat.develop(),
+            seats => seats.par_iter_mut().for_each(Seat::develop),
+        }
     }
 
     /// Carries a robot: it stands at `to` (watcher's frame).

@@ -18,6 +18,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 
+use super::Sight;
 use super::arena::Arena;
 use super::record::{Motion, frame, robot_frame};
 use super::seat::{Guest, pose};
@@ -95,6 +96,19 @@ pub struct Setup {
     pub opponents: [Pose; OPPONENTS],
 }
 
+/// A robot that touched an opponent.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Touch {
+    /// When, s.
+    pub time: f64,
+    /// What its legs did.
+    pub stage: Stage,
+    /// Where it was, in the frame of its team.
+    pub pose: Pose,
+    /// Which opponent, from 0.
+    pub opponent: usize,
+}
+
 /// What came of a trial.
 #[derive(Debug, Clone, Serialize)]
 pub struct Outcome {
@@ -106,6 +120,8 @@ pub struct Outcome {
     pub fell_at: Option<f64>,
     /// Whether it touched an opponent.
     pub touched: bool,
+    /// The first time that it did.
+    pub touch: Option<Touch>,
     /// Kicks that it began.
     pub kicks: u32,
     /// How long it took, s.
@@ -178,10 +194,11 @@ pub fn play(
     field: &Arc<Field>,
     robot: &Arc<Robot>,
     settings: &PlayerSettings,
+    sight: Sight,
     seed: u64,
     seen: Option<&mut Seen>,
 ) -> Result<Outcome, MatchError> {
-    play_for(field, robot, settings, seed, LIMIT, seen)
+    play_for(field, robot, settings, sight, seed, LIMIT, seen)
 }
 
 /// As [`play`], with another limit of time, s.
@@ -192,6 +209,7 @@ pub fn play_for(
     field: &Arc<Field>,
     robot: &Arc<Robot>,
     settings: &PlayerSettings,
+    sight: Sight,
     seed: u64,
     limit: f64,
     mut seen: Option<&mut Seen>,
@@ -200,7 +218,7 @@ pub fn play_for(
     let setup = Setup::random(field, width, seed);
     let entrant = |team, pose| Entrant { robot: Arc::clone(robot), team, pose };
     let start = Start::Near { pose: setup.told, position_sigma: TOLD[0], heading_sigma: TOLD[1] };
-    let guest = Guest { team: Side::Home, number: 2, start, settings: settings.clone(), seed };
+    let guest = Guest { team: Side::Home, number: 2, start, settings: settings.clone(), sight, seed };
     let mut entrants = vec![(entrant(Side::Home, setup.robot), Some(guest))];
     entrants.extend(setup.opponents.iter().map(|pose| (entrant(Side::Away, *pose), None)));
     let mut arena = Arena::new(field, entrants, &SightSettings::default())?;
@@ -236,7 +254,7 @@ struct Watch {
     scored_at: Option<f64>,
     fell_at: Option<f64>,
     out: bool,
-    touched: bool,
+    touch: Option<Touch>,
     kicks: u32,
     kicked_at: Option<f64>,
     stage: Option<Stage>,
@@ -275,7 +293,10 @@ impl Watch {
             Whereabouts::Goal(1) if z < field.goal.height => self.scored_at = Some(time),
             _ => self.out = true,
         }
-        self.touched |= arena.met.iter().any(|(a, _)| *a == 0);
+        if let Some((_, other)) = arena.met.iter().find(|(a, _)| *a == 0) {
+            let touch = Touch { time, stage, pose: pose(&arena.world.on(0)), opponent: other - 1 };
+            self.touch = self.touch.or(Some(touch));
+        }
         arena.met.clear();
         arena.on_ball.clear();
     }
@@ -286,7 +307,7 @@ impl Watch {
         let cause = match (self.scored_at, self.fell_at) {
             (Some(_), _) => None,
             (None, Some(at)) if just_kicked(at) => Some(Cause::FellKicking),
-            (None, Some(_)) if self.touched => Some(Cause::FellTouching),
+            (None, Some(_)) if self.touch.is_some() => Some(Cause::FellTouching),
             (None, Some(_)) => Some(Cause::FellWalking),
             (None, None) if self.out && self.kicks > 0 => Some(Cause::ShotWide),
             (None, None) if self.out => Some(Cause::WalkedOut),
@@ -299,7 +320,8 @@ impl Watch {
             seed,
             scored_at: self.scored_at,
             fell_at: self.fell_at,
-            touched: self.touched,
+            touched: self.touch.is_some(),
+            touch: self.touch,
             kicks: self.kicks,
             time,
             pose_error: self.pose_error,

@@ -17,6 +17,7 @@ use instep_player::legs::Stage;
 use instep_robot::Robot as Model;
 use instep_sim::Entrant;
 
+use super::Sight;
 use super::arena::Arena;
 use super::record::{Motion, frame, robot_frame};
 use super::seat::{Guest, Seat, pose};
@@ -53,6 +54,8 @@ pub struct Outfit {
     pub settings: PlayerSettings,
     /// How many.
     pub players: usize,
+    /// How they see.
+    pub sight: Sight,
 }
 
 /// A game in physics.
@@ -95,7 +98,8 @@ impl PhysicsMatch {
                 let own = Pose::new(x, edge * field.width / 2.0, -edge * PI / 2.0);
                 let start = Start::Near { pose: own, position_sigma: PLACED[0], heading_sigma: PLACED[1] };
                 let seed = seed.wrapping_mul(1000).wrapping_add(10 * u64::from(number) + team as u64);
-                let guest = Guest { team: side, number, start, settings: outfit.settings.clone(), seed };
+                let (settings, sight) = (outfit.settings.clone(), outfit.sight);
+                let guest = Guest { team: side, number, start, settings, sight, seed };
                 let pose = side.pose(&own);
                 entrants.push((Entrant { robot: Arc::clone(&outfit.robot), team: side, pose }, Some(guest)));
                 let (strategy, kicks) = (outfit.settings.strategy.clone(), outfit.settings.kicks.clone());

@@ -11,6 +11,8 @@ use instep_robot::control::JointCommand;
 use instep_sim::sensors::SensorSuite;
 use instep_sim::{View, World};
 
+use super::Sight;
+use super::camera::{Lens, Shot};
 use super::eyes::{Eyes, Other};
 use crate::MatchError;
 use crate::settings::SightSettings;
@@ -27,11 +29,18 @@ pub struct Seat {
     /// Its robot in the world.
     pub(super) index: usize,
     suite: SensorSuite,
-    eyes: Eyes,
+    eyes: Vision,
     pub(super) senses: Senses,
     /// Ticks of the world from one of the player's to the next.
     every: u64,
     pub(super) said: Option<Message>,
+}
+
+/// What a seat sees with.
+#[derive(Debug)]
+enum Vision {
+    Camera(Box<Lens>, Option<Shot>),
+    Simulated(Box<Eyes>),
 }
 
 /// Who is to be seated.
@@ -42,6 +51,7 @@ pub(super) struct Guest {
     /// What it knows of its place, in its team's frame.
     pub start: Start,
     pub settings: PlayerSettings,
+    pub sight: Sight,
     pub seed: u64,
 }
 
@@ -63,6 +73,10 @@ impl Seat {
             return Err(MatchError::Value { what: "field", found, expected: "a field".into() });
         };
         let every = (robot.drives.period / world.settings().step.tick).round().max(1.0) as u64;
+        let eyes = match guest.sight {
+            Sight::Camera => Vision::Camera(Box::new(Lens::new(world, index, camera, guest.seed)?), None),
+            Sight::Simulated => Vision::Simulated(Box::new(Eyes::new(camera, Arc::clone(map), sight, guest.seed))),
+        };
         let identity = Identity { number: guest.number, start: guest.start };
         let mut seat = Self {
             team: guest.team,
@@ -70,7 +84,7 @@ impl Seat {
             player: Player::new(robot, field, identity, guest.settings)?,
             index,
             suite: SensorSuite::of(world, index, guest.seed),
-            eyes: Eyes::new(camera, Arc::clone(map), sight, guest.seed),
+            eyes,
             senses: Senses::default(),
             every,
             said: None,
@@ -102,10 +116,27 @@ impl Seat {
     /// Looks: `others` are in the player's team's frame.
     pub(super) fn look(&mut self, world: &World, others: &ArrayVec<Other, { crate::referee::MOST_ROBOTS }>) {
         let view = world.on(self.index);
-        self.eyes.be_at(&view, self.team.pose(&pose(&view)));
-        let ball = self.suite.ball_sights().and_then(<[_]>::last);
-        if let Some(sights) = self.eyes.frame(view.time(), ball, others) {
-            self.senses.sights = Some(sights);
+        let sights = match &mut self.eyes {
+            Vision::Camera(lens, shot) => {
+                *shot = lens.take(world, self.index, &self.senses.body);
+                lens.arrived(view.time())
+            }
+            Vision::Simulated(eyes) => {
+                eyes.be_at(&view, self.team.pose(&pose(&view)));
+                eyes.frame(view.time(), self.suite.ball_sights().and_then(<[_]>::last), others)
+            }
+        };
+        if sights.is_some() {
+            self.senses.sights = sights;
+        }
+    }
+
+    /// Looks at the frame that was taken, if one was.
+    pub(super) fn develop(&mut self) {
+        if let Vision::Camera(lens, shot) = &mut self.eyes
+            && let Some(shot) = shot.take()
+        {
+            lens.develop(&shot);
         }
     }
 

@@ -7,7 +7,7 @@ use instep_behaviour::{KickTable, Strategy};
 use instep_field::Field;
 use instep_match::MatchSettings;
 use instep_match::physics::fig12h::{self, Seen};
-use instep_match::physics::{Motion, Outfit, PhysicsMatch};
+use instep_match::physics::{Motion, Outfit, PhysicsMatch, Sight};
 use instep_player::PlayerSettings;
 use instep_robot::Robot;
 
@@ -21,7 +21,12 @@ fn artemis() -> (Arc<Robot>, PlayerSettings) {
 
 fn outfits(players: [usize; 2]) -> [Outfit; 2] {
     let (robot, settings) = artemis();
-    players.map(|players| Outfit { robot: Arc::clone(&robot), settings: settings.clone(), players })
+    players.map(|players| Outfit {
+        robot: Arc::clone(&robot),
+        settings: settings.clone(),
+        players,
+        sight: Sight::default(),
+    })
 }
 
 fn played(seconds: f64) -> (Motion, String) {
@@ -48,20 +53,22 @@ fn the_same_game_on_one_thread_and_on_three() {
 fn a_trial_is_repeatable_and_its_robot_sees_the_ball() {
     let (robot, settings) = artemis();
     let field = Arc::new(Field::named("adult-2024").unwrap());
-    let game = |seed| {
+    let game = |seed, sight| {
         let mut seen = Seen::default();
-        let outcome = fig12h::play_for(&field, &robot, &settings, seed, 1.0, Some(&mut seen)).unwrap();
+        let outcome = fig12h::play_for(&field, &robot, &settings, sight, seed, 1.0, Some(&mut seen)).unwrap();
         (outcome, seen)
     };
-    let (first, seen) = game(5);
-    let (again, _) = game(5);
-    assert_eq!(serde_json::to_string(&first).unwrap(), serde_json::to_string(&again).unwrap());
-    assert!(first.fell_at.is_none() && !first.touched);
-    // By its own eyes, near where it is.
-    let last = seen.flat.frames.last().unwrap();
-    let [x, y] = last.robots[0].ball.expect("it has seen the ball, which lies in view");
-    let off = (x - last.ball[0]).hypot(y - last.ball[1]);
-    assert!(off < 0.8, "{off} m");
+    for sight in [Sight::Camera, Sight::Simulated] {
+        let (first, seen) = game(5, sight);
+        let (again, _) = game(5, sight);
+        assert_eq!(serde_json::to_string(&first).unwrap(), serde_json::to_string(&again).unwrap());
+        assert!(first.fell_at.is_none() && !first.touched);
+        // By its own eyes, near where it is.
+        let last = seen.flat.frames.last().unwrap();
+        let [x, y] = last.robots[0].ball.expect("it has seen the ball, which lies in view");
+        let off = (x - last.ball[0]).hypot(y - last.ball[1]);
+        assert!(off < 0.8, "{off} m, {sight:?}");
+    }
 }
 
 #[test]

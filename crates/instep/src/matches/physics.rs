@@ -10,7 +10,7 @@ use clap::Args;
 use instep_behaviour::{KickTable, Strategy};
 use instep_field::Field;
 use instep_match::physics::fig12h::{self, Cause, Outcome, Seen};
-use instep_match::physics::{Outfit, PhysicsMatch};
+use instep_match::physics::{Outfit, PhysicsMatch, Sight};
 use instep_match::{EventKind, MatchSettings};
 use instep_player::PlayerSettings;
 use instep_robot::Robot;
@@ -30,7 +30,7 @@ const LONGEST: f64 = 60.0;
 #[derive(Debug, Args)]
 #[allow(clippy::struct_field_names, reason = "the names are the flags")]
 pub(super) struct InPhysics {
-    /// Play in MuJoCo: every robot on its own senses, the cameras' detections simulated
+    /// Play in MuJoCo: every robot on its own senses, its camera rendered
     #[arg(long)]
     pub(super) physics: bool,
     /// How long the game is, in minutes [default: to its end by the rules]
@@ -39,12 +39,21 @@ pub(super) struct InPhysics {
     /// An experiment in place of a game: fig12h, one robot, three opponents that stand anywhere, a ball in view
     #[arg(long, value_name = "SCENE", requires = "physics")]
     scene: Option<String>,
+    /// Draw what cameras would find from the truth and its errors in place of rendering them: many times as fast
+    #[arg(long, requires = "physics")]
+    simulated_sight: bool,
     /// With --scene: how many set-ups
     #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u64).range(1..=100_000))]
     trials: u64,
     /// With --physics: folder for report.html and, of a game, flat.html [default: out/match]
     #[arg(long, value_name = "FOLDER", default_value = "out/match", requires = "physics")]
     out: PathBuf,
+}
+
+impl InPhysics {
+    fn sight(&self) -> Sight {
+        if self.simulated_sight { Sight::Simulated } else { Sight::Camera }
+    }
 }
 
 /// Runs the command.
@@ -100,7 +109,8 @@ fn game(args: &Match, robot: &Arc<Robot>, player: &PlayerSettings, output: &Outp
     }
     let whole = settings.book.rules.half_time * settings.book.rules.halves as f64 + 600.0;
     let seconds = (60.0 * minutes).min(whole);
-    let outfit = |players| Outfit { robot: Arc::clone(robot), settings: player.clone(), players };
+    let sight = args.in_physics.sight();
+    let outfit = |players| Outfit { robot: Arc::clone(robot), settings: player.clone(), players, sight };
     let mut game = PhysicsMatch::new(Arc::clone(&settings), &counts.map(outfit), 0, args.seed)?;
     game.keep_motion();
     let bar = output::bar(seconds as u64, "{pos}/{len} s of the game {wide_bar} {eta}");
@@ -222,13 +232,13 @@ struct Trials<'a> {
 
 fn scene(args: &Match, robot: &Arc<Robot>, player: &PlayerSettings, output: &Output) -> Result<ExitCode, Failure> {
     let field = Arc::new(Field::named_or_load(&args.rules)?);
-    let count = args.in_physics.trials;
+    let (count, sight) = (args.in_physics.trials, args.in_physics.sight());
     let bar = output::bar(count, "{pos}/{len} trials {wide_bar} {eta}");
     let began = Instant::now();
     let outcomes: Vec<Outcome> = (0..count)
         .into_par_iter()
         .map(|i| {
-            let outcome = fig12h::play(&field, robot, player, args.seed + i, None);
+            let outcome = fig12h::play(&field, robot, player, sight, args.seed + i, None);
             bar.inc(1);
             outcome
         })
@@ -266,7 +276,7 @@ fn scene(args: &Match, robot: &Arc<Robot>, player: &PlayerSettings, output: &Out
     let facts = trials.facts();
     if let Some(shown) = shown {
         let mut seen = Seen::default();
-        fig12h::play(&field, robot, player, shown.seed, Some(&mut seen))?;
+        fig12h::play(&field, robot, player, sight, shown.seed, Some(&mut seen))?;
         let mut events = Vec::new();
         events.extend(shown.scored_at.map(|time| (time, "goal".to_owned())));
         events.extend(shown.fell_at.map(|time| (time, "falls".to_owned())));
