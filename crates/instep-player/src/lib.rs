@@ -8,6 +8,7 @@
 //! - [`place`]: the pose on the field, from odometry, landmarks and what a league tells.
 //! - [`legs`]: stands, walks with a velocity, kicks within the gait, lies on the ground.
 //! - [`push`]: the ball played with the walk itself, for robots without a kick.
+//! - `lane`: the room that a kicking body needs between opponents.
 //! - [`neck`]: which angles of the neck look where the decision wants to look.
 //! - [`guard`]: which senses may be believed at all.
 //!
@@ -16,6 +17,7 @@
 
 mod error;
 pub mod guard;
+mod lane;
 pub mod legs;
 mod message;
 pub mod neck;

@@ -14,6 +14,7 @@ use instep_robot::Robot;
 use instep_robot::control::{BallObservation, JointCommand, Sensors};
 
 use crate::guard::{Guard, Verdict};
+use crate::lane;
 use crate::legs::{Legs, Stage};
 use crate::message::{HeardBall, Message};
 use crate::neck::Neck;
@@ -29,8 +30,13 @@ const BLIND: f64 = 0.6;
 const LINE: [f64; 2] = [0.25, 0.35];
 /// A ball that moved this far from where the kick was aimed is another kick, m.
 const MOVED: f64 = 0.5;
+/// A run-up is given up when its way has become narrower by this factor.
+const CLOSER: f64 = 0.6;
 /// Longest run-up, s: something is wrong with it.
 const RUN_UP: f64 = 8.0;
+/// A kick that is turned by more than this goes where nobody aimed, rad: it shall be soft, m/s.
+const ASIDE: f64 = 0.1;
+const SOFT: f64 = 2.0;
 /// Radius that other robots are walked round with, m.
 const OTHERS: f64 = 0.25;
 /// Longest period of a tick that the neck is moved for, s.
@@ -65,6 +71,17 @@ struct Heard {
     time: f64,
 }
 
+/// A kick that the legs were asked for, field frame.
+#[derive(Debug, Clone, Copy)]
+struct Asked {
+    /// Where the ball lay, m.
+    ball: Point,
+    /// rad.
+    direction: f64,
+    /// How far others were from its way, m.
+    room: f64,
+}
+
 /// Times of the last decision, command and message, s.
 #[derive(Debug, Clone, Copy)]
 struct Last {
@@ -95,8 +112,9 @@ pub struct Player {
     seen_mates: ArrayVec<Point, MAX_TEAM>,
     decision: Option<Decision>,
     velocity: [f64; 3],
-    /// Direction of the kick that the legs were asked for, and where the ball lay, field frame.
-    asked: Option<([f64; 2], f64)>,
+    asked: Option<Asked>,
+    /// By how much the next kick is turned past opponents, rad.
+    turned: f64,
     last: Last,
     sensors: Sensors,
     obstacles: Vec<Obstacle>,
@@ -171,6 +189,7 @@ impl Player {
             decision: None,
             velocity: [0.0; 3],
             asked: None,
+            turned: 0.0,
             last: Last { tick: begin, decided: begin, navigated: begin, said: begin, frame: begin, asked: begin },
             sensors: Sensors::default(),
             obstacles: Vec::with_capacity(3 * MAX_TEAM),
@@ -369,20 +388,29 @@ impl Player {
                 Way::Behind(to) => self.go(time, pose, to, true),
             };
         };
-        let line = Pose::new(ball[0], ball[1], request.direction);
+        self.turned = lane::turn(ball, request.direction, run_up, self.others(), self.turned);
+        let direction = instep_field::wrap(request.direction + self.turned);
+        let speed = if self.turned.abs() > ASIDE { request.speed.min(SOFT) } else { request.speed };
+        let line = Pose::new(ball[0], ball[1], direction);
         let [along, beside] = line.local_from_outer(pose.position());
-        let turned = instep_field::wrap(request.direction - pose.heading);
+        let turned = instep_field::wrap(direction - pose.heading);
         let fresh = self.beliefs.ball.age(time) < BLIND;
         if fresh && (-1.6 * run_up..=-0.5 * run_up).contains(&along) && beside.abs() < LINE[0] && turned.abs() < LINE[1]
         {
             let odometry_from_field = self.legs.odometry().then(&pose.inverse());
             let aim = odometry_from_field.outer_from_local(ball);
-            self.legs.kick(aim, request.direction + odometry_from_field.heading, request.speed);
-            (self.asked, self.last.asked) = (Some((ball, request.direction)), time);
+            self.legs.kick(aim, direction + odometry_from_field.heading, speed);
+            let room = lane::room(ball, direction, run_up, self.others());
+            (self.asked, self.last.asked) = (Some(Asked { ball, direction, room }), time);
             return self.velocity;
         }
         let [x, y] = line.outer_from_local([-run_up, 0.0]);
-        self.go(time, pose, Pose::new(x, y, request.direction), true)
+        self.go(time, pose, Pose::new(x, y, direction), true)
+    }
+
+    /// Where other robots are believed to be, field frame, m.
+    fn others(&self) -> impl Iterator<Item = Point> + Clone {
+        self.beliefs.opponents.iter().map(|o| o.circle.center).chain(self.seen_mates.iter().copied())
     }
 
     /// A run-up goes on while the ball lies where it lay and the decision stays.
@@ -391,12 +419,18 @@ impl Player {
             return;
         }
         let ball = self.beliefs.ball;
-        let moved = self.asked.is_none_or(|(was, _)| {
+        let moved = self.asked.is_none_or(|Asked { ball: was, .. }| {
             (ball.position[0] - was[0]).hypot(ball.position[1] - was[1]) > MOVED || !ball.is_known()
         });
         let other = matches!(motion, Motion::Stand | Motion::GetUp)
             || !matches!(action, Action::Approach | Action::SetPieceOurs | Action::Dribble | Action::Kick);
-        if moved || other || time - self.last.asked > RUN_UP {
+        let pose = self.place.pose();
+        // Somebody has come into its way.
+        let blocked = self.asked.is_some_and(|asked| {
+            let left = (asked.ball[0] - pose.x).hypot(asked.ball[1] - pose.y);
+            lane::room(asked.ball, asked.direction, left, self.others()) < CLOSER * asked.room.min(lane::ROOM)
+        });
+        if moved || other || blocked || time - self.last.asked > RUN_UP {
             self.legs.give_up();
         }
     }
