@@ -48,6 +48,24 @@ fn parent(file: &Path) -> &Path {
     file.parent().unwrap_or(Path::new(""))
 }
 
+/// Takes `checkpoint` for this process alone, for as long as what it returns lives; its folder exists.
+///
+/// # Errors
+/// When another process works on it, or the lock beside it cannot be written.
+pub(crate) fn alone(checkpoint: &Path) -> Result<std::fs::File, Failure> {
+    let name = checkpoint.file_name().unwrap_or_default().to_string_lossy();
+    let path = checkpoint.with_file_name(format!(".{name}.lock"));
+    let lock = std::fs::File::create(&path).map_err(|e| refused(&path, e))?;
+    match lock.try_lock() {
+        Ok(()) => Ok(lock),
+        Err(std::fs::TryLockError::WouldBlock) => Err(Failure::input(format!(
+            "{}: another training works on it; wait for it, stop it, or give another --out",
+            checkpoint.display()
+        ))),
+        Err(std::fs::TryLockError::Error(e)) => Err(refused(&path, e)),
+    }
+}
+
 /// Files that become visible together.
 #[derive(Debug, Default)]
 pub(crate) struct Batch {

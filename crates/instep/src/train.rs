@@ -129,6 +129,7 @@ impl Train {
         let mut training = self.training(&files.checkpoint)?;
         std::fs::create_dir_all(&self.out)
             .map_err(|e| Failure::input(format!("{}: cannot be made: {e} (--out)", self.out.display())))?;
+        let _alone = files::alone(&files.checkpoint)?;
 
         let stop = stopped_by_the_user();
         let bar = output::bar(training.state.budget, "{wide_bar} {human_pos}/{human_len} steps, {msg} {eta}");

@@ -40,12 +40,14 @@ pub(crate) struct Lens {
     /// When the next frame is due, s, and how many there were.
     next: f64,
     count: u64,
+    /// Taken, not yet looked at.
+    shot: Option<Shot>,
     coming: VecDeque<(f64, Sights)>,
 }
 
-/// A frame that was taken, not yet looked at.
+/// A frame that was taken.
 #[derive(Debug)]
-pub(crate) struct Shot {
+struct Shot {
     time: f64,
     scene: Scene,
     /// `heading_from_camera` as the robot knows it.
@@ -74,16 +76,17 @@ impl Lens {
             seed,
             next: 0.0,
             count: 0,
+            shot: None,
             coming: VecDeque::new(),
         })
     }
 
     /// Takes the frame that is due; `body` is what robot `index` of `world` senses of itself.
-    pub(crate) fn take(&mut self, world: &World, index: usize, body: &Sensors) -> Option<Shot> {
+    pub(crate) fn take(&mut self, world: &World, index: usize, body: &Sensors) {
         let time = world.time();
-        let field = world.field()?;
+        let Some(field) = world.field() else { return };
         if time + 1e-9 < self.next || body.joint_positions.len() + 7 != self.q.len() {
-            return None;
+            return;
         }
         self.next = (self.next + self.camera.period).max(time);
         self.count += 1;
@@ -124,7 +127,7 @@ impl Lens {
             radius: world.settings().ball.radius as f32,
         };
         let noise = self.seed.wrapping_mul(0x9E37_79B9).wrapping_add(self.count);
-        Some(Shot { time, scene: staged(field, optical, look, Some(ball), &players, noise), known })
+        self.shot = Some(Shot { time, scene: staged(field, optical, look, Some(ball), &players, noise), known });
     }
 
     /// The camera over the ground under the base, by the body's own senses.
@@ -145,8 +148,9 @@ impl Lens {
         pose(&Isometry3::from_parts(at.into(), turn))
     }
 
-    /// Looks at a frame: it arrives when the camera and its computer are done.
-    pub(crate) fn develop(&mut self, shot: &Shot) {
+    /// Looks at the frame that was taken, if one was: it arrives when the camera and its computer are done.
+    pub(crate) fn develop(&mut self) {
+        let Some(shot) = self.shot.take() else { return };
         let view = self.renderer.render(&shot.scene);
         // The renderer's frames have the network's size.
         let found = self.detector.detect(&view.frame, &THRESHOLDS).unwrap_or_default();

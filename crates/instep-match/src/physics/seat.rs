@@ -12,7 +12,7 @@ use instep_sim::sensors::SensorSuite;
 use instep_sim::{View, World};
 
 use super::Sight;
-use super::camera::{Lens, Shot};
+use super::camera::Lens;
 use super::eyes::{Eyes, Other};
 use crate::MatchError;
 use crate::settings::SightSettings;
@@ -39,7 +39,7 @@ pub struct Seat {
 /// What a seat sees with.
 #[derive(Debug)]
 enum Vision {
-    Camera(Box<Lens>, Option<Shot>),
+    Camera(Box<Lens>),
     Simulated(Box<Eyes>),
 }
 
@@ -74,7 +74,7 @@ impl Seat {
         };
         let every = (robot.drives.period / world.settings().step.tick).round().max(1.0) as u64;
         let eyes = match guest.sight {
-            Sight::Camera => Vision::Camera(Box::new(Lens::new(world, index, camera, guest.seed)?), None),
+            Sight::Camera => Vision::Camera(Box::new(Lens::new(world, index, camera, guest.seed)?)),
             Sight::Simulated => Vision::Simulated(Box::new(Eyes::new(camera, Arc::clone(map), sight, guest.seed))),
         };
         let identity = Identity { number: guest.number, start: guest.start };
@@ -117,8 +117,8 @@ impl Seat {
     pub(super) fn look(&mut self, world: &World, others: &ArrayVec<Other, { crate::referee::MOST_ROBOTS }>) {
         let view = world.on(self.index);
         let sights = match &mut self.eyes {
-            Vision::Camera(lens, shot) => {
-                *shot = lens.take(world, self.index, &self.senses.body);
+            Vision::Camera(lens) => {
+                lens.take(world, self.index, &self.senses.body);
                 lens.arrived(view.time())
             }
             Vision::Simulated(eyes) => {
@@ -133,10 +133,8 @@ impl Seat {
 
     /// Looks at the frame that was taken, if one was.
     pub(super) fn develop(&mut self) {
-        if let Vision::Camera(lens, shot) = &mut self.eyes
-            && let Some(shot) = shot.take()
-        {
-            lens.develop(&shot);
+        if let Vision::Camera(lens) = &mut self.eyes {
+            lens.develop();
         }
     }
 

@@ -9,6 +9,7 @@ use instep_perception::{Camera, dataset};
 
 use super::count;
 use crate::failure::Failure;
+use crate::files;
 use crate::output::{self, Output};
 
 #[derive(Debug, Args)]
@@ -103,6 +104,7 @@ impl TrainArgs {
             None => Training::new(plan, sources),
         };
         let checkpoint = self.out.with_extension("checkpoint");
+        let _alone = files::alone(&checkpoint)?;
         if checkpoint.exists() {
             training.resume(&checkpoint)?;
         }

@@ -40,6 +40,13 @@ fn a_policy_is_trained_resumed_measured_and_kicks() {
     for file in ["checkpoint.safetensors", "policy.safetensors", "policy.onnx", "README.md", "report.html"] {
         assert!(at.join("out/train").join(file).exists(), "{file}");
     }
+    // Two in one folder would each undo what the other does.
+    let other = std::fs::File::open(at.join("out/train/.checkpoint.safetensors.lock")).unwrap();
+    other.lock().unwrap();
+    let refused = instep(at, &["train", "--reference", REFERENCE, "--settings", "small.toml", "--budget", "1024"]);
+    let said = String::from_utf8_lossy(&refused.stderr);
+    assert!(refused.status.code() == Some(2) && said.contains("another training works on it"), "{said}");
+    drop(other);
     let policy = std::fs::read(at.join("out/train/policy.safetensors")).unwrap();
     assert!(policy.len() < 5 << 20, "a policy of {} bytes", policy.len());
 
