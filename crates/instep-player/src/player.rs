@@ -43,6 +43,8 @@ const OTHERS: f64 = 0.25;
 const LONGEST: f64 = 0.05;
 /// Above this height a ball flies, m: where its picture meets the ground it is not.
 const FLIES: f64 = 0.6;
+/// From farther than this it walks where it looks, m; from nearer it looks as it shall stand.
+const FAR: f64 = 1.0;
 /// Distance within which a seen mate is the one that said to be there, m.
 const SAME: f64 = 0.7;
 
@@ -456,7 +458,7 @@ impl Player {
             let radius = (self.tuning.round_ball - self.tuning.radius).max(0.0);
             self.obstacles.push(still(self.beliefs.ball.position, radius));
         }
-        let far = pose.distance(&to) > 2.0;
+        let far = pose.distance(&to) > FAR;
         let facing = if far || !self.beliefs.ball.is_known() { Facing::Path } else { Facing::Hold(to.heading) };
         let view = instep_navigation::View { time, pose: *pose, velocity: None, obstacles: &self.obstacles };
         let goal = Goal { target: Target::Pose(to), facing, speed: f64::INFINITY };
