@@ -9,7 +9,7 @@ use instep_field::Pose;
 /// How far past the ball the body goes before it has slowed down, m.
 const PAST: f64 = 0.7;
 /// Room on each side of the body's middle to an opponent's, m.
-pub(crate) const ROOM: f64 = 0.6;
+const ROOM: f64 = 0.6;
 /// How far a kick is turned at most, rad, and by which steps.
 const MOST: f64 = 1.3;
 const STEP: f64 = 0.13;
@@ -33,7 +33,7 @@ pub(crate) fn turn(
 }
 
 /// Least distance of `others` from the way of a body, m.
-pub(crate) fn room(ball: Point, direction: f64, run_up: f64, others: impl Iterator<Item = Point>) -> f64 {
+fn room(ball: Point, direction: f64, run_up: f64, others: impl Iterator<Item = Point>) -> f64 {
     let line = Pose::new(ball[0], ball[1], direction);
     let distance = |other| {
         let [along, beside] = line.local_from_outer(other);

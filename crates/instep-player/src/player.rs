@@ -30,8 +30,6 @@ const BLIND: f64 = 0.6;
 const LINE: [f64; 2] = [0.25, 0.35];
 /// A ball that moved this far from where the kick was aimed is another kick, m.
 const MOVED: f64 = 0.5;
-/// A run-up is given up when its way has become narrower by this factor.
-const CLOSER: f64 = 0.6;
 /// Longest run-up, s: something is wrong with it.
 const RUN_UP: f64 = 8.0;
 /// A kick that is turned by more than this goes where nobody aimed, rad: it shall be soft, m/s.
@@ -73,17 +71,6 @@ struct Heard {
     time: f64,
 }
 
-/// A kick that the legs were asked for, field frame.
-#[derive(Debug, Clone, Copy)]
-struct Asked {
-    /// Where the ball lay, m.
-    ball: Point,
-    /// rad.
-    direction: f64,
-    /// How far others were from its way, m.
-    room: f64,
-}
-
 /// Times of the last decision, command and message, s.
 #[derive(Debug, Clone, Copy)]
 struct Last {
@@ -114,7 +101,8 @@ pub struct Player {
     seen_mates: ArrayVec<Point, MAX_TEAM>,
     decision: Option<Decision>,
     velocity: [f64; 3],
-    asked: Option<Asked>,
+    /// Where the ball lay when the legs were asked for a kick, field frame, m.
+    asked: Option<Point>,
     /// By how much the next kick is turned past opponents, rad.
     turned: f64,
     last: Last,
@@ -402,8 +390,7 @@ impl Player {
             let odometry_from_field = self.legs.odometry().then(&pose.inverse());
             let aim = odometry_from_field.outer_from_local(ball);
             self.legs.kick(aim, direction + odometry_from_field.heading, speed);
-            let room = lane::room(ball, direction, run_up, self.others());
-            (self.asked, self.last.asked) = (Some(Asked { ball, direction, room }), time);
+            (self.asked, self.last.asked) = (Some(ball), time);
             return self.velocity;
         }
         let [x, y] = line.outer_from_local([-run_up, 0.0]);
@@ -421,18 +408,12 @@ impl Player {
             return;
         }
         let ball = self.beliefs.ball;
-        let moved = self.asked.is_none_or(|Asked { ball: was, .. }| {
-            (ball.position[0] - was[0]).hypot(ball.position[1] - was[1]) > MOVED || !ball.is_known()
-        });
+        let moved = self
+            .asked
+            .is_none_or(|was| (ball.position[0] - was[0]).hypot(ball.position[1] - was[1]) > MOVED || !ball.is_known());
         let other = matches!(motion, Motion::Stand | Motion::GetUp)
             || !matches!(action, Action::Approach | Action::SetPieceOurs | Action::Dribble | Action::Kick);
-        let pose = self.place.pose();
-        // Somebody has come into its way.
-        let blocked = self.asked.is_some_and(|asked| {
-            let left = (asked.ball[0] - pose.x).hypot(asked.ball[1] - pose.y);
-            lane::room(asked.ball, asked.direction, left, self.others()) < CLOSER * asked.room.min(lane::ROOM)
-        });
-        if moved || other || blocked || time - self.last.asked > RUN_UP {
+        if moved || other || time - self.last.asked > RUN_UP {
             self.legs.give_up();
         }
     }
