@@ -4,6 +4,8 @@
 //! A trial starts in the track's first state (or a later one, or the trials' starts are spread over the clip) with the small
 //! errors of [`StartSettings`], and goes on until two seconds after the contact, or the end of the stand if that is later.
 
+mod chatter;
+
 use std::sync::Arc;
 
 use instep_kick::policy::{PERIOD, Policy, PolicyKick};
@@ -89,6 +91,8 @@ pub struct Tried {
     pub audit_invalid: bool,
     /// Joints beyond a torque or speed limit.
     pub limit_violations: usize,
+    /// Share of the ticks in which a joint's torque has gone from beyond +80 % to beyond -80 % of its limit, or back, within 40 ms.
+    pub torque_reversals: f64,
     /// Which, how far and when.
     pub beyond: Vec<LimitViolation>,
 }
@@ -122,6 +126,8 @@ pub struct Summary {
     pub audit_invalid: usize,
     /// Joints beyond a limit, over all trials.
     pub limit_violations: usize,
+    /// Mean share of ticks in which a joint's torque has gone from beyond +80 % to beyond -80 % of its limit, or back, within 40 ms.
+    pub torque_reversal_share: f64,
     /// Each trial.
     pub each: Vec<Tried>,
 }
@@ -218,6 +224,7 @@ fn attempt(
         farthest = farthest.max(deviation.farthest.0);
     }
     let valid = trial.audit.is_valid();
+    let limits: Vec<f64> = robot.joints.iter().map(|joint| joint.torque).collect();
     let clip_end = track.duration() - evaluation.start;
     Ok(Tried {
         seed: evaluation.seed,
@@ -231,6 +238,7 @@ fn attempt(
         fell_at: trial.fell_at,
         audit_invalid: trial.impact.is_some() && !valid,
         limit_violations: trial.limit_violations.len(),
+        torque_reversals: chatter::share(&trial.record.times, &trial.record.torques, &limits),
         beyond: trial.limit_violations,
     })
 }
@@ -254,6 +262,7 @@ fn summary(each: Vec<Tried>) -> Summary {
         converged: rate("converged_rate", |tried| tried.converged),
         audit_invalid: each.iter().filter(|tried| tried.audit_invalid).count(),
         limit_violations: each.iter().map(|tried| tried.limit_violations).sum(),
+        torque_reversal_share: each.iter().map(|tried| tried.torque_reversals).sum::<f64>() / count,
         each,
     }
 }

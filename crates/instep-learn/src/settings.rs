@@ -307,8 +307,8 @@ impl Default for WorldSettings {
             solver_tolerance: 1e-5,
             ball: false,
             sensors: instep_sim::settings::SensorNoise::default(),
-            drives: Fidelity::AsBuilt,
-            senses: Fidelity::AsBuilt,
+            drives: Fidelity::Ideal,
+            senses: Fidelity::Ideal,
             spread: Spread::default(),
         }
     }
@@ -317,8 +317,8 @@ impl Default for WorldSettings {
 impl LearnSettings {
     /// The second stage of paper 1: from a policy that follows its reference to one that kicks the ball, with the values of the
     /// shipped policy's last millions of steps. Little exploration and a loose threshold; start errors half as large again as
-    /// those of trials, mostly at the clip's start, where trials start; a ball that is worth less than a fall costs; a fine
-    /// physics step, and joint speeds held well below their limits, for a landing is short and hard.
+    /// those of trials, mostly at the clip's start, where trials start; a ball that is worth less than a fall costs; the world as
+    /// built, a little different for each environment, in its own step; and joint speeds held well below their limits, for a landing is short and hard.
     #[must_use]
     pub fn ball() -> Self {
         Self {
@@ -349,7 +349,15 @@ impl LearnSettings {
                 sigma: 0.1,
                 ..PpoSettings::default()
             },
-            world: WorldSettings { step: 0.0025, ball: true, ..WorldSettings::default() },
+            world: WorldSettings {
+                // In longer ones it learns what only they allow, and falls in the world that it is measured in.
+                step: 0.001,
+                ball: true,
+                drives: Fidelity::AsBuilt,
+                senses: Fidelity::AsBuilt,
+                spread: Spread { mass: 0.03, friction: 0.15, delay: 0.003, restitution: 0.04, ..Spread::default() },
+                ..WorldSettings::default()
+            },
             ..Self::default()
         }
     }

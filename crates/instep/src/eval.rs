@@ -91,6 +91,7 @@ fn text(summary: &Summary, paint: Paint) -> String {
         row("converged", format!("{}, run again at a quarter of the step", share(&summary.converged))),
         row("audit refused", summary.audit_invalid.to_string()),
         row("limits passed", summary.limit_violations.to_string()),
+        row("torques from limit to limit", format!("{:.2} % of ticks", 100.0 * summary.torque_reversal_share)),
     ]
     .join("\n")
 }

@@ -16,6 +16,7 @@ fn tried(speed: Option<f64>, direction: Option<f64>, link_error: f64) -> Tried {
         fell_at: None,
         audit_invalid: false,
         limit_violations: 2,
+        torque_reversals: 0.0,
         beyond: vec![],
     }
 }
