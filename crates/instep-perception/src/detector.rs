@@ -177,9 +177,9 @@ pub fn team(frame: &Frame, rect: &Rect) -> Option<Team> {
     }
 }
 
-/// Confidence above which the shipped detector's finds of each class are used: where nine of ten are right on frames 5000 to
-/// 5099 of the test (a post's is lower than that: at 0.6 next to none would be left).
-pub const THRESHOLDS: [f32; Class::ALL.len()] = [0.42, 0.5, 0.35, 0.5, 0.55, 0.45];
+/// Confidence above which the shipped detector's finds of each class are used: where nine of ten are right; a ball's where less
+/// than one frame in a thousand has a false one.
+pub const THRESHOLDS: [f32; Class::ALL.len()] = [0.6, 0.5, 0.35, 0.5, 0.55, 0.45];
 
 impl Detection {
     /// Whether it is confident enough to be used.
