@@ -28,7 +28,7 @@ const AFTER: f64 = 0.8;
 /// A ball that leaves slower than this share of the asked speed was not hit.
 const HIT: f64 = 0.3;
 /// A kick is delivered when the ball has this share of the asked speed or more,
-const DELIVERED_SPEED: f64 = 0.8;
+pub(crate) const DELIVERED_SPEED: f64 = 0.8;
 /// and goes at most this far off the asked direction, rad.
 const DELIVERED_DIRECTION: f64 = 15.0 * std::f64::consts::PI / 180.0;
 /// Sets the draw of a start's errors apart from the trial's noise, which has the same seed.
@@ -111,6 +111,13 @@ pub struct CellResult {
     pub key: CellKey,
     /// For each case, in order: what came of it, or the refusal's name.
     pub outcomes: Vec<Result<Kicked, String>>,
+    /// For each case, the fastest ball that the robot's geometry and joint speeds allow, m/s, `None` where no foot comes to it
+    /// ([`instep_kick::bound`]; of a rolling ball one that is fast enough will do); empty where kicks do not start from the stand.
+    #[serde(default)]
+    pub bounds: Vec<Option<f64>>,
+    /// For each case, the speed that was asked, m/s.
+    #[serde(default)]
+    pub asked: Vec<f64>,
     /// Time of each plan, s.
     pub plan_times: Vec<f64>,
     /// Median and 99th percentile of the ticks' times, s.
@@ -155,8 +162,17 @@ pub fn run_cell(subject: &Subject, scenario: &Scenario, key: &CellKey) -> Result
     let mut outcomes = Vec::with_capacity(key.requests);
     let mut shared: Option<World> = None;
     let cases = cases(subject, scenario, key)?;
+    let stands = subject.engine(&key.engine)?.own_start().is_none();
+    let mut bounds = if stands { subject.bounds() } else { None };
+    let mut fastest = Vec::new();
+    let asked = cases.iter().map(|case| case.request.strength.value()).collect();
     let mut world_changes = BTreeSet::new();
     for case in cases {
+        if let Some(bounds) = &mut bounds {
+            let rolls = case.request.ball_velocity != [0.0; 2];
+            let enough = if rolls { case.request.strength.value() } else { f64::INFINITY };
+            fastest.push(bounds.of(&case.request, enough).map(|bound| bound.ball_speed));
+        }
         let world = match &mut shared {
             Some(world) if !scenario.varies_world() => world,
             slot => slot.insert(world(subject, scenario, &case)?),
@@ -169,7 +185,7 @@ pub fn run_cell(subject: &Subject, scenario: &Scenario, key: &CellKey) -> Result
     ticks.sort_by(f32::total_cmp);
     let at = |share: f64| ticks.get(((ticks.len() as f64 * share) as usize).min(ticks.len().max(1) - 1));
     let tick_times = [0.5, 0.99].map(|share| at(share).map_or(0.0, |t| f64::from(*t)));
-    Ok(CellResult { key: key.clone(), outcomes, plan_times, tick_times, world_changes })
+    Ok(CellResult { key: key.clone(), outcomes, bounds: fastest, asked, plan_times, tick_times, world_changes })
 }
 
 /// The cases of a cell.

@@ -5,10 +5,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use instep_kick::adaptive::{AdaptiveKick, AdaptiveSettings, GRID_FILE, Stabiliser, load_grid};
-use instep_kick::dynamic::{DynamicKick, DynamicSettings};
+use instep_kick::bound::Bounds;
+use instep_kick::dynamic::{DynamicKick, DynamicSettings, Feedback, Pid};
 use instep_kick::gaze::{Gaze, Gazing};
 use instep_kick::policy::{LearnedKick, PolicySettings};
-use instep_kick::preview::{PreviewKick, PreviewSettings};
+use instep_kick::preview::{Com, PreviewKick, PreviewSettings, Stabiliser as PreviewStabiliser};
 use instep_kick::{BallModel, Build, Derive, KickEngine, Settings};
 use instep_robot::Robot;
 use instep_sim::settings::{Ball, Fidelity, WorldSettings};
@@ -56,15 +57,42 @@ const ENTRIES: &[Entry] = &[
         make: |subject, file, text| subject.dynamic(file, text, |settings| settings.feedback.on = false),
     },
     Entry {
+        name: "dynamic-paper",
+        file: "dynamic.toml",
+        make: |subject, file, text| subject.dynamic(file, text, |settings| by_pressure(&mut settings.feedback)),
+    },
+    Entry {
         name: "dynamic-tuned",
         file: "dynamic-tuned.toml",
         make: |subject, file, text| subject.dynamic(file, text, |_| ()),
     },
-    Entry { name: "preview", file: "preview.toml", make: |subject, file, text| subject.preview(file, text) },
+    Entry { name: "preview", file: "preview.toml", make: |subject, file, text| subject.preview(file, text, |_| ()) },
+    Entry {
+        name: "preview-paper",
+        file: "preview.toml",
+        make: |subject, file, text| {
+            subject.preview(file, text, |settings| {
+                settings.com = Com::TwoLink;
+                settings.stabilisers = vec![PreviewStabiliser::Preview];
+            })
+        },
+    },
+    Entry {
+        name: "preview-filter",
+        file: "preview.toml",
+        make: |subject, file, text| {
+            subject.preview(file, text, |settings| settings.stabilisers = vec![PreviewStabiliser::Preview])
+        },
+    },
+    Entry {
+        name: "preview-two-link",
+        file: "preview.toml",
+        make: |subject, file, text| subject.preview(file, text, |settings| settings.com = Com::TwoLink),
+    },
     Entry {
         name: "preview-tuned",
         file: "preview-tuned.toml",
-        make: |subject, file, text| subject.preview(file, text),
+        make: |subject, file, text| subject.preview(file, text, |_| ()),
     },
     Entry { name: "adaptive", file: "adaptive.toml", make: |subject, file, text| subject.adaptive(file, text, |_| ()) },
     Entry {
@@ -89,13 +117,25 @@ const ENTRIES: &[Entry] = &[
             subject.adaptive(file, text, |settings| settings.stabiliser = Stabiliser::Inclination)
         },
     },
+    Entry {
+        name: "adaptive-paper",
+        file: "adaptive.toml",
+        make: |subject, file, text| {
+            subject.adaptive(file, text, |settings| {
+                settings.stabiliser = Stabiliser::Inclination;
+                settings.kick.true_shape = false;
+            })
+        },
+    },
     Entry { name: "in-gait", file: "in-gait.toml", make: |subject, file, text| subject.in_gait(file, text) },
     Entry { name: "policy", file: "policy.toml", make: |subject, file, text| subject.policy(file, text) },
 ];
 
 /// Names of the engines. `dynamic-open` is `dynamic` with its closed loop off, `…-tuned` an engine with the settings that
 /// `instep tune` found. `adaptive-once` plans the retraction once, `adaptive-sphere` takes the foot for a sphere,
-/// `adaptive-inclination` has the paper's stabiliser. `policy` starts in a
+/// `adaptive-inclination` has the paper's stabiliser. `…-paper` is an engine with its paper's own stabiliser and placement alone:
+/// `dynamic-paper` the PID on foot pressure, `adaptive-paper` body inclination and the foot as a sphere, `preview-paper` the filter
+/// with the preview loop (alone: `preview-filter`) and the two-link arm (alone: `preview-two-link`). `policy` starts in a
 /// run-up, `in-gait` from the stand a run-up away from the ball.
 pub fn engines() -> impl Iterator<Item = &'static str> {
     ENTRIES.iter().map(|entry| entry.name)
@@ -103,6 +143,12 @@ pub fn engines() -> impl Iterator<Item = &'static str> {
 
 /// The engines that are compared unless others are asked for: one of each kind, as it is meant to be used.
 pub const LEADING: [&str; 4] = ["dynamic", "adaptive", "preview-tuned", "policy"];
+
+/// Paper 2's loop (section 3.5): PID on the centre of pressure and nothing else.
+fn by_pressure(feedback: &mut Feedback) {
+    let pid = Pid { p: 0.1, i: 0.2, d: 0.02, limit: feedback.x.limit };
+    *feedback = Feedback { x: pid, y: pid, tilt: 0.0, rate: 0.0, ..*feedback };
+}
 
 /// A robot with what its trials share.
 #[derive(Debug, Clone)]
@@ -239,6 +285,14 @@ impl Subject {
         Self { world: Some(world), robot, ..self }
     }
 
+    /// What the robot's geometry and joint speeds allow of a kick from the stand; `None` for a robot that cannot stand on one foot.
+    #[must_use]
+    pub fn bounds(&self) -> Option<Bounds> {
+        let file = "dynamic.toml";
+        let settings = DynamicSettings::parse(file, &self.settings("dynamic").ok()?).ok()?;
+        Bounds::new(Arc::clone(&self.robot), self.ball, settings).ok()
+    }
+
     /// The engine called `name`, whose robot looks at the ball where it has a neck.
     ///
     /// # Errors
@@ -264,8 +318,9 @@ impl Subject {
         Ok(Box::new(DynamicKick::new(Arc::clone(&self.robot), self.ball, settings)?))
     }
 
-    fn preview(&self, file: &str, text: &str) -> Made {
-        let settings = PreviewSettings::parse(file, text)?;
+    fn preview(&self, file: &str, text: &str, change: fn(&mut PreviewSettings)) -> Made {
+        let mut settings = PreviewSettings::parse(file, text)?;
+        change(&mut settings);
         Ok(Box::new(PreviewKick::new(Arc::clone(&self.robot), self.ball, settings)?))
     }
 

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use instep_sim::NamedRate;
 use serde::Serialize;
 
-use crate::cell::{CellResult, Kicked};
+use crate::cell::{CellResult, DELIVERED_SPEED, Kicked};
 
 /// One row. The names of the fields are KickBench's file format. Each rate is three keys, `…_low` and `…_high` being its 95 %
 /// interval (Wilson).
@@ -39,6 +39,14 @@ pub struct Row {
     /// Kicks that were what had been asked over all requests.
     #[serde(flatten)]
     pub delivered: NamedRate,
+    /// Requests that the robot's geometry and joint speeds allow, over all; null where kicks do not start from the stand.
+    #[serde(flatten)]
+    pub allowed: NamedRate,
+    /// Kicks that were what had been asked over those requests.
+    #[serde(flatten)]
+    pub delivered_of_allowed: NamedRate,
+    /// Median of the fastest balls that they allow, m/s.
+    pub bound_ball_speed_median: Option<f64>,
     /// Kicks that touched the ball and whose re-run at a quarter of the step led to the same, over those that touched it.
     #[serde(flatten)]
     pub converged: NamedRate,
@@ -156,6 +164,12 @@ fn row(cells: &[&CellResult], seed: SeedName) -> Row {
         *refused_why.entry(name.clone()).or_insert(0) += 1;
     }
     let requests = outcomes().count();
+    let bounds = || cells.iter().flat_map(|cell| cell.outcomes.iter().zip(&cell.bounds).zip(&cell.asked));
+    let judged = bounds().count();
+    let possible = bounds().filter(|((_, bound), asked)| bound.is_some_and(|bound| bound >= DELIVERED_SPEED * **asked));
+    let possible: Vec<_> =
+        possible.map(|((outcome, _), _)| outcome.as_ref().is_ok_and(|kick| kick.delivered)).collect();
+    let delivered_of = possible.iter().filter(|delivered| **delivered).count();
     let count = |good: fn(&Kicked) -> bool| kicked.iter().filter(|kick| good(kick)).count();
     let touched = count(|kick| kick.contact.is_some());
     let of = |value: fn(&Kicked) -> Option<f64>, share: f64| {
@@ -178,6 +192,9 @@ fn row(cells: &[&CellResult], seed: SeedName) -> Row {
         hit: NamedRate::of("hit_rate", count(|kick| kick.hit), kicked.len()),
         upright: NamedRate::of("upright_rate", count(|kick| kick.upright), kicked.len()),
         delivered: NamedRate::of("delivered_rate", count(|kick| kick.delivered), requests),
+        allowed: NamedRate::of("allowed_rate", possible.len(), judged),
+        delivered_of_allowed: NamedRate::of("delivered_of_allowed_rate", delivered_of, possible.len()),
+        bound_ball_speed_median: quantile(bounds().filter_map(|((_, bound), _)| *bound).collect(), 0.5),
         converged: NamedRate::of("converged_rate", count(|kick| kick.converged), touched),
         ball_speed_median: of(|k| k.ball_speed, 0.5),
         speed_ratio_median: of(ratio, 0.5),
@@ -255,6 +272,7 @@ pub fn text_table(rows: &[Row]) -> (Vec<&'static str>, Vec<Vec<String>>) {
         "hit %",
         "upright %",
         "delivered %",
+        "of allowed %",
         "ball m/s (of asked)",
         "off deg p50/p90",
         "rolled m",
@@ -282,6 +300,7 @@ pub fn text_table(rows: &[Row]) -> (Vec<&'static str>, Vec<Vec<String>>) {
                 percent(&r.hit),
                 percent(&r.upright),
                 percent(&r.delivered),
+                percent(&r.delivered_of_allowed),
                 format!("{} ({})", number(r.ball_speed_median, 1.0, 2), number(r.speed_ratio_median, 1.0, 2)),
                 pair(r.direction_error_median_deg, r.direction_error_p90_deg, 1.0, 1),
                 number(r.distance_median, 1.0, 2),

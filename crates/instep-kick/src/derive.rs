@@ -267,7 +267,7 @@ impl Derive for AdaptiveSettings {
                 friction: 0.5,
                 forecast_least: 0.8,
                 speed_gain: 1.0,
-                speed_least: 0.5,
+                speed_least: 0.8,
                 wait: 2.0,
             },
             times: build.times(),

@@ -9,6 +9,7 @@ use instep_robot::control::{Controller, Sensors};
 use serde::{Deserialize, Serialize};
 
 use crate::request::{KickRequest, Refusal};
+use crate::stand::Standing;
 
 /// Why an engine gave a kick up that it had begun.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -144,6 +145,26 @@ pub trait KickEngine: Controller {
     /// # Errors
     /// Why this kick is not possible; the robot goes on as before.
     fn plan(&mut self, request: &KickRequest, sensors: &Sensors) -> Result<KickPlan, Refusal>;
+
+    /// Tells a kick under way where its ball is now: `request` is the one that was planned but for the ball. It is followed until the
+    /// strike begins, as far as the foot can.
+    ///
+    /// # Errors
+    /// [`Refusal::NoKick`] when none is under way, [`Refusal::Struck`] when it is too late, [`Refusal::Busy`] when another kick is
+    /// asked or the engine follows no ball.
+    fn update(&mut self, request: &KickRequest, sensors: &Sensors) -> Result<(), Refusal> {
+        let _ = (request, sensors);
+        let running =
+            matches!(self.progress().status, KickStatus::Running | KickStatus::Holding | KickStatus::Cancelling);
+        Err(if running { Refusal::Busy } else { Refusal::NoKick })
+    }
+
+    /// Where the robot could stand for the kick of `request`, which it refuses from where it stands. Plans many times: for a caller
+    /// that walks. `None` where no easy place will do, or for engines that cannot say.
+    fn where_to_stand(&mut self, request: &KickRequest) -> Option<Standing> {
+        let _ = request;
+        None
+    }
 
     /// Lets a held foot kick at the next tick.
     fn release(&mut self);

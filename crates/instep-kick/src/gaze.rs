@@ -13,6 +13,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::engine::{BreakOff, KickEngine, KickPlan, KickStart, Progress};
 use crate::request::{KickRequest, Refusal};
+use crate::stand::Standing;
 use crate::tree::{Tree, TreePose};
 
 /// How fast the neck is turned, rad/s.
@@ -191,6 +192,14 @@ impl KickEngine for Gazing {
         self.ball = Some(self.gaze.before_base(request.ball));
         self.time = None;
         Ok(plan)
+    }
+
+    fn update(&mut self, request: &KickRequest, sensors: &Sensors) -> Result<(), Refusal> {
+        self.engine.update(request, sensors)
+    }
+
+    fn where_to_stand(&mut self, request: &KickRequest) -> Option<Standing> {
+        self.engine.where_to_stand(request)
     }
 
     fn release(&mut self) {

@@ -2,8 +2,10 @@
 //!
 //! - [`request`]: what is asked, and the causes of a refusal; [`dialect`]: the request formats that teams already send.
 //! - [`ball`]: the ball that a robot plays.
+//! - [`bound`]: what geometry and joint speeds allow of a kick, whatever the engine.
 //! - [`gaze`]: a neck that keeps the camera on the ball, for any engine.
 //! - [`rolling`]: how fast the ball rolls, from the camera's sights of it.
+//! - [`stand`]: where to stand for a kick that was refused.
 //! - [`settings`]: the files of a robot's folder, read and checked.
 //! - [`derive`]: those settings as they follow from a robot, so that a file holds only what differs.
 //! - [`engine`]: the trait that every engine implements.
@@ -20,6 +22,7 @@
 
 pub mod adaptive;
 pub mod ball;
+pub mod bound;
 pub mod derive;
 pub mod dialect;
 pub mod dynamic;
@@ -34,6 +37,7 @@ pub mod preview;
 pub mod request;
 pub mod rolling;
 pub mod settings;
+pub mod stand;
 pub mod track;
 pub mod tree;
 pub mod whole_body;
@@ -45,3 +49,4 @@ pub use error::KickError;
 pub use playback::Playback;
 pub use request::{KickRequest, Learned, Place, Refusal, Strength};
 pub use settings::Settings;
+pub use stand::Standing;

@@ -85,6 +85,12 @@ impl KickRequest {
         }
     }
 
+    /// Whether `other` asks for the same kick, wherever the ball is.
+    #[must_use]
+    pub fn differs_by_ball(&self, other: &Self) -> bool {
+        Self { ball: other.ball, ball_velocity: other.ball_velocity, ..*self } == *other
+    }
+
     /// The first thing in it that is not a finite number, or a strength that is not above zero.
     ///
     /// # Errors
@@ -244,13 +250,25 @@ pub enum Refusal {
     },
     /// Within the measured grid of reachable places no part of a foot can be brought behind the ball, or none so that it
     /// moves in the wanted direction.
-    #[error("the ball is outside what a foot can reach for that direction{}", nearest_text(.nearest))]
+    #[error("the ball is outside what a foot can reach for that direction")]
     OutsideGrid {
         /// The foot that was asked for.
         foot: Option<Side>,
-        /// The nearest request that can be kicked: ball, m, and direction, rad.
-        nearest: Option<([f64; 2], f64)>,
     },
+    /// On its way back the foot would touch the ball.
+    #[error("on its way to the wind-up point the {foot} foot would come within {gap:.3} m of the ball")]
+    BrushesBall {
+        /// The foot.
+        foot: Side,
+        /// Smallest gap, m; negative is an overlap.
+        gap: f64,
+    },
+    /// An update of a kick that is over or was never asked.
+    #[error("no kick is under way whose ball could be updated")]
+    NoKick,
+    /// An update that comes too late.
+    #[error("the strike has begun: the ball cannot be followed any more")]
+    Struck,
     /// A kick is under way.
     #[error("a kick is under way; cancel it first")]
     Busy,
@@ -386,6 +404,9 @@ impl Refusal {
             Self::TooLate { .. } => "too_late",
             Self::TooImprecise { .. } => "too_imprecise",
             Self::OutsideGrid { .. } => "outside_grid",
+            Self::BrushesBall { .. } => "brushes_ball",
+            Self::NoKick => "no_kick",
+            Self::Struck => "struck",
             Self::Busy => "busy",
             Self::NotStanding { .. } => "not_standing",
             Self::NotAtStart { .. } => "not_at_start",
@@ -394,15 +415,6 @@ impl Refusal {
             Self::CannotHold => "cannot_hold",
         }
     }
-}
-
-fn nearest_text(nearest: &Option<([f64; 2], f64)>) -> String {
-    nearest.map_or_else(
-        || "; walk to it first".to_owned(),
-        |([x, y], direction)| {
-            format!("; the nearest that can be kicked: ball ({x:.2}, {y:.2}) m, {:.0} degrees", direction.to_degrees())
-        },
-    )
 }
 
 /// A place of the swing.

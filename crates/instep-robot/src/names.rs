@@ -5,7 +5,7 @@ use std::path::Path;
 use mujoco_rs::prelude::*;
 
 use crate::RobotError;
-use crate::drive::{DriveSettings, Pid};
+use crate::drive::{DriveKind, DriveSettings, Pid};
 use crate::robot::Joint;
 use crate::settings::RobotFile;
 
@@ -170,6 +170,17 @@ pub(crate) fn joints(
             if joint.torque <= 0.0 {
                 let field = format!("group[{g}].torque");
                 return Err(names.wrong(&field, format!("none, and the model has none for \"{name}\""), "N m".into()));
+            }
+            // The largest error that there can be must bring the whole torque, or the limit is one that the servo never reaches.
+            if settings.drives.kind == DriveKind::PositionServo && joint.pid.p * range < joint.torque {
+                let (most, limit) = (joint.pid.p * range, joint.torque);
+                let found =
+                    format!("{}, which gives {most:.3} N m over the range of \"{name}\", {range:.3} rad", joint.pid.p);
+                return Err(names.wrong(
+                    &format!("group[{g}].pid.p"),
+                    found,
+                    format!("{:.3} N m/rad or more, for its torque limit of {limit} N m", limit / range),
+                ));
             }
             joint.static_friction =
                 not_negative("static_friction", group.static_friction, joint.torque, "N m, at most the torque")?;

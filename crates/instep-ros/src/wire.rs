@@ -577,12 +577,15 @@ fn is_reach(refusal: &Refusal) -> bool {
         | Refusal::OutsideGrid { .. }
         | Refusal::OtherKick { .. }
         | Refusal::OtherFoot { .. }
+        | Refusal::BrushesBall { .. }
         | Refusal::OffBalance { .. } => true,
         Refusal::NotFinite { .. }
         | Refusal::NoStrength { .. }
         | Refusal::TooLate { .. }
         | Refusal::TooImprecise { .. }
         | Refusal::Busy
+        | Refusal::NoKick
+        | Refusal::Struck
         | Refusal::NotStanding { .. }
         | Refusal::NotAtStart { .. }
         | Refusal::CannotHold => false,

@@ -39,6 +39,8 @@ fn cell(scenario: &str, seed: u64, outcomes: Vec<Result<Kicked, String>>) -> Cel
             fingerprint: 0,
         },
         outcomes,
+        bounds: Vec::new(),
+        asked: Vec::new(),
         plan_times,
         tick_times: [seed as f64, 10.0 * seed as f64],
         world_changes: std::iter::once(format!("changed by {scenario}")).collect(),
@@ -115,5 +117,5 @@ fn a_rate_is_shown_in_per_cent_with_its_interval() {
     let rows = rows(&[cell("straight", 1, vec![Ok(kicked(1.5, 2.0, 3.0))])]);
     let (head, body) = text_table(&rows);
     assert_eq!(head.len(), body[0].len());
-    assert_eq!(body[0][8..], ["1.50 (0.75)", "3.0/3.0", "1.50", "1.50", "1000.0/1000.0", "1000000/10000000", "0", "2"]);
+    assert_eq!(body[0][9..], ["1.50 (0.75)", "3.0/3.0", "1.50", "1.50", "1000.0/1000.0", "1000000/10000000", "0", "2"]);
 }

@@ -15,7 +15,6 @@ use instep_robot::control::{Controller, JointCommand, Sensors};
 use nalgebra::Vector2;
 
 use crate::KickError;
-use crate::adaptive::ball::Watch;
 use crate::adaptive::geometry::{PARTS, Part};
 use crate::adaptive::grid::{CELL, Grid};
 use crate::adaptive::lookup::{Found, Query, look_up};
@@ -29,12 +28,14 @@ use crate::engine::{BreakOff, Face, KickEngine, KickPlan, KickStatus, Phase, Pro
 use crate::ik::Ik;
 use crate::request::{KickRequest, Place, Refusal, Strength};
 use crate::settings::Settings;
+use crate::stand::{self, Standing};
 use crate::tree::TreePose;
 use crate::whole_body::body::Body;
 use crate::whole_body::drive::{Drive, Footing, Wanted};
 use crate::whole_body::motion::Motion;
 use crate::whole_body::timeline::Course;
 use crate::whole_body::torque::Dynamics;
+use crate::whole_body::watch::Watch;
 
 /// Distance between the ball and the one of the present stroke from which on another is looked up, m.
 const MOVED: f64 = 0.004;
@@ -94,6 +95,7 @@ pub struct AdaptiveKick {
     motion: Motion,
     stroke: Option<Stroke>,
     request: Option<KickRequest>,
+    planned: Option<KickPlan>,
     watch: Option<Watch>,
     candidate: Option<Candidate>,
     search: Option<Search>,
@@ -136,6 +138,7 @@ impl AdaptiveKick {
             motion: Motion::standing(&body, Side::Right),
             stroke: None,
             request: None,
+            planned: None,
             watch: None,
             candidate: None,
             search: None,
@@ -430,10 +433,14 @@ impl KickEngine for AdaptiveKick {
 
     fn plan(&mut self, request: &KickRequest, sensors: &Sensors) -> Result<KickPlan, Refusal> {
         if self.course.running() {
-            return Err(Refusal::Busy);
+            // A goal that says only where the ball is now is followed.
+            let planned = self.planned.ok_or(Refusal::Busy)?;
+            self.update(request, sensors)?;
+            return Ok(planned);
         }
         self.body.check_standing(sensors, self.settings.limits.stand)?;
         let planned = self.planner.plan(&self.body, &self.settings, &self.grid, request)?;
+        self.planned = Some(planned.plan);
         let swing = planned.stroke.swing;
         let place = self.body.support_from_footprint(swing, request.ball).into();
         self.watch = Some(Watch::new(place, request.ball_velocity.into(), sensors.time));
@@ -446,6 +453,29 @@ impl KickEngine for AdaptiveKick {
         (self.caught, self.unaimed) = (false, false);
         self.drive.start(&self.body, swing, &self.body.angles, self.settings.control_period, true);
         Ok(planned.plan)
+    }
+
+    fn update(&mut self, request: &KickRequest, sensors: &Sensors) -> Result<(), Refusal> {
+        request.check()?;
+        if !self.course.running() {
+            return Err(Refusal::NoKick);
+        }
+        if !self.request.is_some_and(|planned| planned.differs_by_ball(request)) || !self.settings.feedback.follow_ball
+        {
+            return Err(Refusal::Busy);
+        }
+        if self.motion.timeline.phase(self.clock) > Phase::WindUp || self.course.status() == KickStatus::Cancelling {
+            return Err(Refusal::Struck);
+        }
+        let place = self.body.support_from_footprint(self.motion.swing, request.ball).into();
+        self.watch = Some(Watch::new(place, request.ball_velocity.into(), sensors.time));
+        (self.candidate, self.search) = (None, None);
+        Ok(())
+    }
+
+    fn where_to_stand(&mut self, request: &KickRequest) -> Option<Standing> {
+        let Self { planner, body, settings, grid, .. } = self;
+        stand::nearest(body, request, |asked| planner.plan(body, settings, grid, asked).is_ok())
     }
 
     fn release(&mut self) {

@@ -8,7 +8,6 @@
 //!
 //! It does not walk, does not recover from a fall, and knows no obstacle but the robot itself.
 
-mod ball;
 mod engine;
 mod geometry;
 pub mod grid;

@@ -9,6 +9,7 @@ use nalgebra::{Vector2, Vector3};
 
 use crate::adaptive::geometry::Part;
 use crate::adaptive::settings::AdaptiveSettings;
+use crate::dynamic::THROUGH;
 use crate::engine::{Face, Phase};
 use crate::whole_body::body::Body;
 use crate::whole_body::motion::{Motion, place};
@@ -97,7 +98,8 @@ impl Stroke {
 
 /// The kick with `stroke`, from the stand to the stand.
 pub(crate) fn kick(body: &Body, settings: &AdaptiveSettings, stroke: &Stroke) -> Motion {
-    let mut motion = Motion::raised(body, &settings.manner(), stroke.swing);
+    let away = if stroke.at > 0.0 { [0.0; 2] } else { body.away(stroke.swing, stroke.ball) };
+    let mut motion = Motion::raised(body, &settings.manner(), stroke.swing, away);
     retract(&mut motion, body, settings, stroke, settings.times.foot_least);
     strike(&mut motion, stroke);
     motion.back(body, &settings.manner(), stroke.pace);
@@ -171,7 +173,13 @@ fn strike(motion: &mut Motion, stroke: &Stroke) {
         (from, speed) = (point, pass);
     }
     motion.contact = Some(motion.foot.end());
-    motion.foot.to(2.0 * stroke.follow / stroke.speed, State::at_rest(stroke.pose(&stroke.rest())));
+    // On at the same speed for a moment: drives that lag meet the ball a little later, and a foot that brakes then kicks by chance.
+    let on = THROUGH.min(0.45 * stroke.follow / stroke.speed);
+    let (way, along) = (on * stroke.speed, stroke.direction());
+    let position = stroke.pose(&(stroke.contact + Vector3::new(along.x, along.y, 0.0) * way));
+    let velocity = [along.x * stroke.speed, along.y * stroke.speed, 0.0, 0.0, 0.0];
+    motion.foot.to(on, State { position, velocity, acceleration: [0.0; 5] });
+    motion.foot.to(2.0 * (stroke.follow - way) / stroke.speed, State::at_rest(stroke.pose(&stroke.rest())));
     motion.trunk.hold(motion.foot.end() - motion.trunk.end());
     motion.timeline.end_at(Phase::Kick, motion.foot.end());
 }

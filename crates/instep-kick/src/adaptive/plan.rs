@@ -3,7 +3,6 @@
 //! The grid proposes strokes with every part of both feet (`lookup`); inverse kinematics checks them with the foot's
 //! rotation, which the grid does not hold; the best is followed along its whole way with joint speeds, torques and the centre of
 //! pressure, and slowed down until all are within limits ("at the joints' limits"): the plan says what speed comes.
-//! Where no stroke is in the grid, the nearest request that can be kicked is named.
 
 use instep_motion::phase::Side;
 use nalgebra::{Rotation3, Vector2, Vector3};
@@ -17,15 +16,14 @@ use crate::ik::Ik;
 use crate::request::{KickRequest, Place, Refusal};
 use crate::tree::TreePose;
 use crate::whole_body::body::Body;
-use crate::whole_body::foot::wrap;
 use crate::whole_body::forecast::{Demands, FAR, MIDDLE, Rehearsal, graver, ground_gap, judge, miss};
 use crate::whole_body::motion::{Motion, goals};
 use crate::whole_body::torque::Dynamics;
 
 /// Strokes whose whole way is forecast.
-const FORECASTS: usize = 14;
+const FORECASTS: usize = 8;
 /// The same where many plans are compared.
-const FEW_FORECASTS: usize = 3;
+const FEW_FORECASTS: usize = 2;
 /// Cost of slowing a stroke down by its whole speed, or its retraction by its whole time.
 const SLOW_COST: f64 = 0.5;
 /// Share of the joints' speeds that retraction and way back may take: there is time, and a leg that swings freely overshoots.
@@ -38,17 +36,11 @@ const SLOWER: f64 = 0.85;
 const PACE: f64 = 1.4;
 const SLOWEST: f64 = 3.0;
 /// Waits for a rolling ball that are tried, s.
-const WAIT_STEP: f64 = 0.08;
+const WAIT_STEP: f64 = 0.2;
 /// Times of contact with a rolling ball that are compared.
 const GOOD_TIMES: usize = 2;
 /// How much later than the ball the foot may be, s.
 const ON_TIME: f64 = 0.02;
-/// Grid steps of a search for the nearest reachable request: ball, m, and direction, rad.
-const NEAREST_BALL: f64 = 0.02;
-const NEAREST_DIRECTION: f64 = 0.175;
-/// Whole plans that such a search may take, and after them those along the way to an easy request.
-const NEAREST_PLANS: usize = 16;
-const EASIER: u32 = 24;
 
 /// A motion that was forecast to be possible.
 #[derive(Debug, Clone, Copy)]
@@ -104,13 +96,8 @@ impl Planner {
         request: &KickRequest,
     ) -> Result<Planned, Refusal> {
         request.check()?;
-        let planned = match self.plan_moving(body, settings, grid, request) {
-            Err(Refusal::OutsideGrid { foot, .. }) => {
-                let nearest = self.nearest(body, settings, grid, request);
-                return Err(Refusal::OutsideGrid { foot, nearest });
-            }
-            other => other?,
-        };
+        body.check_clear(request.ball)?;
+        let planned = self.plan_moving(body, settings, grid, request)?;
         if let Some(deadline) = request.deadline
             && planned.plan.contact > deadline
         {
@@ -160,8 +147,7 @@ impl Planner {
                 break;
             }
         }
-        best.map(|(planned, _)| planned)
-            .ok_or_else(|| refusal.unwrap_or(Refusal::OutsideGrid { foot: request.foot, nearest: None }))
+        best.map(|(planned, _)| planned).ok_or_else(|| refusal.unwrap_or(Refusal::OutsideGrid { foot: request.foot }))
     }
 
     /// All strokes of the grid for a ball that is at a place (m) with a velocity (m/s) at the contact, best first.
@@ -236,7 +222,7 @@ impl Planner {
             }
         }
         self.found = found;
-        best.ok_or_else(|| refusal.unwrap_or(Refusal::OutsideGrid { foot: request.foot, nearest: None }))
+        best.ok_or_else(|| refusal.unwrap_or(Refusal::OutsideGrid { foot: request.foot }))
     }
 
     /// What the caller is told.
@@ -321,6 +307,7 @@ impl Planner {
                 calm: [[CALM, 1.0]; 2],
                 roll: 0.0,
                 ground: GROUND,
+                ball: (stroke.at == 0.0).then_some(stroke.ball),
             };
             match self.rehearsal.forecast(body, &motion, &demands) {
                 Ok(()) => return Ok(motion),
@@ -353,52 +340,6 @@ impl Planner {
     ) -> Result<(), Refusal> {
         let Rehearsal { ik, pose, angles, .. } = &mut self.rehearsal;
         check(body, settings, (ik, pose, angles), stroke, place, what, steps)
-    }
-
-    /// The request nearest to `request` that can be kicked: its ball (m) and direction (rad).
-    fn nearest(
-        &mut self,
-        body: &Body,
-        settings: &AdaptiveSettings,
-        grid: &Grid,
-        request: &KickRequest,
-    ) -> Option<([f64; 2], f64)> {
-        // A step of the ball weighs as much as one of the direction.
-        let mut steps: Vec<[i32; 3]> = Vec::new();
-        for x in -20..=20 {
-            for y in -20..=20 {
-                for turn in -9..=9 {
-                    steps.push([x, y, turn]);
-                }
-            }
-        }
-        steps.sort_by_key(|[x, y, turn]| (x * x + y * y + turn * turn, turn.abs(), x.abs(), *x, *y, *turn));
-        let mut tries = |ball: [f64; 2], direction: f64| {
-            let asked = KickRequest { ball, direction, ball_velocity: [0.0; 2], hold: false, ..*request };
-            let meeting = Meeting::at_rest(ball, FEW_FORECASTS);
-            self.plan_at(body, settings, grid, &asked, &meeting).map(|_| (ball, direction))
-        };
-        let mut plans = 0;
-        for [x, y, turn] in steps {
-            let ball = [request.ball[0] + f64::from(x) * NEAREST_BALL, request.ball[1] + f64::from(y) * NEAREST_BALL];
-            match tries(ball, wrap(request.direction + f64::from(turn) * NEAREST_DIRECTION)) {
-                Ok(nearest) => return Some(nearest),
-                Err(Refusal::OutsideGrid { .. }) => {}
-                Err(_) => plans += 1,
-            }
-            if plans >= NEAREST_PLANS {
-                break;
-            }
-        }
-        // In front of the nearer foot, straight ahead.
-        let side = if request.ball[1] < 0.0 { -1.0 } else { 1.0 };
-        let gap = 0.5 * (settings.kick.retraction[0] + settings.kick.retraction[1]);
-        let easy = [body.feet[0].outline_x[1] + body.ball.radius + gap, side * body.half_width];
-        (1..=EASIER).find_map(|i| {
-            let share = f64::from(i) / f64::from(EASIER);
-            let ball = [0, 1].map(|k| request.ball[k] + share * (easy[k] - request.ball[k]));
-            tries(ball, (1.0 - share) * wrap(request.direction)).ok()
-        })
     }
 }
 

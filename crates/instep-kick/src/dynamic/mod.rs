@@ -5,7 +5,7 @@
 //! its section 6, future work: phase times come from distances and limits, unreachable requests are refused before the
 //! robot moves, self-collision is avoided, the inertial sensor and the robot's dynamics are used. Ours beyond the
 //! paper: both feet and three faces are forecast and the best wins; feed-forward torques by inverse dynamics; a cancel
-//! in any phase leads back to the stand; a ball that moves during the wind-up is followed.
+//! in any phase leads back to the stand; a ball that moves during the wind-up is followed, rolling or not.
 //!
 //! It does not walk, does not recover from a fall, and knows no obstacle but the robot itself.
 
@@ -24,23 +24,30 @@ use crate::KickError;
 use crate::ball::BallModel;
 use crate::derive::{Build, Derive};
 use crate::engine::{KickEngine, KickPlan, KickStatus, Phase, Progress};
-use crate::ik::Ik;
+use crate::ik::{Ik, Weights};
 use crate::request::{KickRequest, Place, Refusal};
 use crate::settings::Settings;
+use crate::stand::{self, Standing};
 use crate::tree::TreePose;
 use crate::whole_body::body::Body;
 use crate::whole_body::drive::{Drive, Footing, Wanted, pressure};
-use crate::whole_body::forecast::{ROLL, judge, miss};
+use crate::whole_body::forecast::{judge, miss};
 use crate::whole_body::motion::{Motion, goals};
 use crate::whole_body::timeline::Course;
 use crate::whole_body::torque::Dynamics;
+use crate::whole_body::watch::Watch;
 use follow::Follow;
 use motion::Stroke;
+pub(crate) use motion::THROUGH;
 use plan::Planner;
 
 pub use crate::whole_body::{Feedback, Limits, Pid, Stance, Times};
 pub use settings::{Accuracy, DynamicSettings, Swing};
 
+/// Weight of the swing foot's roll in inverse kinematics, 1/rad: a leg that swings to the side need not keep its sole level.
+const LEAN: f64 = 0.3;
+/// Damping of inverse kinematics: more than elsewhere, so that what weighs little does not move the joints quickly.
+const DAMPING: f64 = 0.1;
 /// Steps of inverse kinematics in a check of a new stroke.
 const PROBE_STEPS: usize = 10;
 
@@ -53,6 +60,8 @@ pub struct DynamicKick {
     drive: Drive,
     motion: Motion,
     stroke: Option<Stroke>,
+    /// What was asked last, and what came of it.
+    planned: Option<(KickRequest, KickPlan)>,
     /// The motion's own time, s; it stands still while the foot is held.
     clock: f64,
     course: Course,
@@ -72,7 +81,8 @@ impl DynamicKick {
     /// When a setting cannot be or does not fit the robot.
     pub fn new(robot: Arc<Robot>, ball: BallModel, settings: DynamicSettings) -> Result<Self, KickError> {
         settings.validate()?;
-        let ik = Ik::new(&robot, &settings.coupled, settings.limits.joint_margin, settings.limits.knee_bend)?;
+        let ik = Ik::new(&robot, &settings.coupled, settings.limits.joint_margin, settings.limits.knee_bend)?
+            .with_weights(Weights { roll: LEAN, damping: DAMPING, ..Weights::default() });
         let dynamics = || Dynamics::new(&robot, &settings.coupled);
         let body = Body::new(Arc::clone(&robot), ball, &settings.arms)?;
         Ok(Self {
@@ -80,6 +90,7 @@ impl DynamicKick {
             drive: Drive::new(&body, ik.clone(), dynamics(), pressure(settings.feedback)),
             motion: Motion::standing(&body, Side::Right),
             stroke: None,
+            planned: None,
             clock: 0.0,
             course: Course::idle(),
             caught: false,
@@ -133,6 +144,12 @@ impl DynamicKick {
         self.drive.planned_cop
     }
 
+    /// The ball of `request` as the support foot of `swing` has it.
+    fn watch(&self, swing: Side, request: &KickRequest, sensors: &Sensors) -> Watch {
+        let place = self.body.support_from_footprint(swing, request.ball).into();
+        Watch::new(place, request.ball_velocity.into(), sensors.time)
+    }
+
     /// Follows a ball that is seen to move during the wind-up; `ahead` (s) is the time of the newest sample.
     fn follow(&mut self, sensors: &Sensors, ahead: f64) {
         let (Some(mut follow), Some(stroke)) = (self.follow, self.stroke) else { return };
@@ -144,10 +161,11 @@ impl DynamicKick {
         }
         let swing = stroke.swing;
         if let Some(ball) = sensors.ball {
-            follow.see(ball.time, self.body.sighted(&self.drive.now, swing, ball.position));
+            follow.see(ball.time, self.body.sighted(&self.drive.now, swing, ball.position), &self.body.ball);
         }
         if phase == Phase::WindUp {
-            follow.propose(&stroke);
+            let left = self.motion.contact.unwrap_or(time) - time;
+            follow.propose(&stroke, sensors.time + left, &self.body.ball);
             if let Some((candidate, ball, good)) = follow.candidate {
                 let places = [candidate.pose(0.0), candidate.windup_pose(), candidate.follow_pose()];
                 if good < places.len() {
@@ -160,7 +178,7 @@ impl DynamicKick {
                     }
                     let Self { body, ik, probe, probe_angles, settings, .. } = self;
                     let off = ik.solve(&body.tree, probe, probe_angles, swing, &goals, PROBE_STEPS);
-                    let fine = judge(body, &settings.limits, probe, swing, Place::Way, miss(&off, ROLL)).is_ok();
+                    let fine = judge(body, &settings.limits, probe, swing, Place::Way, miss(&off, 0.0)).is_ok();
                     follow.candidate = fine.then_some((candidate, ball, good + 1));
                 } else {
                     self.motion = motion::retargeted(&self.motion, &self.body, &self.settings, time, &candidate);
@@ -228,22 +246,43 @@ impl KickEngine for DynamicKick {
 
     fn plan(&mut self, request: &KickRequest, sensors: &Sensors) -> Result<KickPlan, Refusal> {
         if self.course.running() {
-            return Err(Refusal::Busy);
+            // A goal that says only where the ball is now is followed (paper 2, section 4.1).
+            let planned = self.planned.ok_or(Refusal::Busy)?;
+            self.update(request, sensors)?;
+            return Ok(planned.1);
         }
         self.body.check_standing(sensors, self.settings.limits.stand)?;
         let planned = self.planner.plan(&self.body, &self.settings, request)?;
+        self.planned = Some((*request, planned.plan));
         self.motion = planned.motion;
         self.stroke = Some(planned.stroke);
         self.clock = 0.0;
         let swing = planned.stroke.swing;
-        let resting = request.ball_velocity.iter().all(|v| v.abs() < 0.02);
-        let target = self.body.support_from_footprint(swing, request.ball).into();
-        let follows = self.settings.feedback.on && self.settings.feedback.follow_ball && resting;
-        self.follow = follows.then(|| Follow::new(target));
+        let follows = self.settings.feedback.on && self.settings.feedback.follow_ball;
+        let watch = self.watch(swing, request, sensors);
+        self.follow = follows.then(|| Follow::new(planned.stroke.ball, watch));
         self.course = Course::started(request.hold);
         self.caught = false;
         self.drive.start(&self.body, swing, &self.body.angles, self.settings.control_period, true);
         Ok(planned.plan)
+    }
+
+    fn update(&mut self, request: &KickRequest, sensors: &Sensors) -> Result<(), Refusal> {
+        request.check()?;
+        if !self.course.running() {
+            return Err(Refusal::NoKick);
+        }
+        if !self.planned.is_some_and(|(planned, _)| planned.differs_by_ball(request)) {
+            return Err(Refusal::Busy);
+        }
+        let watch = self.watch(self.motion.swing, request, sensors);
+        self.follow.as_mut().ok_or(Refusal::Struck)?.told(watch);
+        Ok(())
+    }
+
+    fn where_to_stand(&mut self, request: &KickRequest) -> Option<Standing> {
+        let Self { planner, body, settings, .. } = self;
+        stand::nearest(body, request, |asked| planner.plan(body, settings, asked).is_ok())
     }
 
     fn release(&mut self) {

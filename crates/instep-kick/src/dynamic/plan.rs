@@ -6,7 +6,7 @@
 //! ranges, joint speeds, motor torques (by inverse dynamics), gaps between parts of the robot, and the planned centre
 //! of pressure in the support foot.
 
-use std::f64::consts::FRAC_PI_4;
+use std::f64::consts::{FRAC_PI_4, PI};
 
 use instep_motion::phase::Side;
 use nalgebra::{Vector2, Vector3};
@@ -18,60 +18,81 @@ use crate::ik::Ik;
 use crate::request::{KickRequest, Place, Refusal};
 use crate::whole_body::body::Body;
 use crate::whole_body::foot::{FacePoint, contact_point, paper_choice, paper_face, wrap};
-use crate::whole_body::forecast::{Demands, FAR, MIDDLE, NEAR, ROLL, Rehearsal, check_place, graver, judge};
+use crate::whole_body::forecast::{Demands, FAR, MIDDLE, NEAR, Rehearsal, check_place, graver, judge};
 use crate::whole_body::motion::{Motion, goals};
 use crate::whole_body::torque::Dynamics;
 
 /// The share of the asked speed below which a slower stroke is no answer.
-const SLOWEST: f64 = 0.88;
-/// Wind-ups, in units of the one that there is room for, and speeds, in units of the asked one, in the order in which they are
+const SLOWEST: f64 = 0.8;
+/// Wind-ups, in units of the one that there is room for, and how hasty the stroke is over them, in the order in which they are
 /// tried.
-const TRIES: [(f64, f64); 7] = [(1.0, 1.0), (1.5, 1.0), (0.7, 1.0), (2.0, 1.0), (1.0, 0.89), (1.5, 0.89), (2.0, 0.89)];
+const WINDUPS: [(f64, f64); 6] = [(1.0, 2.0), (1.5, 2.0), (1.0, 1.7), (1.5, 1.7), (0.7, 2.0), (0.45, 2.0)];
+/// What is left of the joints' speed when a stroke that was too fast is tried again, slower.
+const AGAIN: f64 = 0.98;
+/// Ways that are looked at by inverse kinematics, of these those whose whole motion may be forecast, and how many forecasts that
+/// may take: what bounds the time of a plan.
+const SCREENS: usize = 40;
+const CANDIDATES: usize = 8;
+const FORECASTS: usize = 14;
+/// What the times of retraction and way back are multiplied with until the joints can, and how much at most.
+const PACE: f64 = 1.5;
+const SLOW_MOST: f64 = 4.0;
+/// Peak over mean speed of a quintic from rest to rest, and room for ways that are not straight in the joints.
+const PEAK: f64 = 1.875 * 1.2;
 /// Way over which the joints' speeds at the contact are taken, m.
 const WAY: f64 = 0.01;
 /// Share of the speed limit up to which a stroke is left as the settings have it.
 const CALM: f64 = 0.6;
-/// How far and in which steps pitch (rad/m) and rise are searched.
-const PITCHES: u8 = 16;
-const PITCH_STEP: f64 = 0.5;
-const RISES: u8 = 10;
-const RISE_STEP: f64 = 0.05;
+/// How far and in which steps pitch (rad/m), rise and turn (rad/m) are searched.
+const PITCH: [f64; 2] = [0.5, 16.0];
+const RISE: [f64; 2] = [0.05, 10.0];
+const TURN: [f64; 2] = [0.5, 8.0];
 /// Least height of the swing foot over the ground in the forecast, m.
 const GROUND: f64 = 0.006;
 /// Speeds of joints after the contact, in units of their limits, up to which they come back in time.
 const LATE: f64 = 1.5;
 /// Least and greatest angle from the foot's x axis at which a corner strikes, rad.
-const CORNER: [f64; 2] = [0.0, 1.3];
+const CORNER: [f64; 2] = [0.03, 1.4];
+/// Yaws of the foot with a corner, rad: steps to either side.
+const YAW_STEP: f64 = 0.2;
+const YAWS: i32 = 6;
+/// Shares of a flat face's half width at which it may meet the ball.
+const SLIDES: [f64; 5] = [0.0, 0.5, -0.5, 0.95, -0.95];
+/// Way of the foot from its place, in units of the leg's length, up to which a contact costs nothing.
+const EASY: f64 = 0.4;
+/// Times at which a rolling ball may be met: from the soonest, by steps, s.
+const MEETING_STEP: f64 = 0.25;
+const MEETINGS: usize = 9;
+/// How much later than the ball the foot may be, s.
+const ON_TIME: f64 = 0.02;
+/// Speed below which a ball counts as resting, m/s.
+pub(crate) const RESTS: f64 = 0.02;
 
-/// Every way to strike: front and sides with the foot turned as the face needs; the corners with the foot turned all the
-/// way, half or not.
-const WAYS: [(Side, Face, f64); 12] = {
-    let [l, r] = [Side::Left, Side::Right];
-    [
-        (l, Face::Front, 1.0),
-        (l, Face::Inner, 1.0),
-        (l, Face::Outer, 1.0),
-        (l, Face::Corner, 1.0),
-        (l, Face::Corner, 0.5),
-        (l, Face::Corner, 0.0),
-        (r, Face::Front, 1.0),
-        (r, Face::Inner, 1.0),
-        (r, Face::Outer, 1.0),
-        (r, Face::Corner, 1.0),
-        (r, Face::Corner, 0.5),
-        (r, Face::Corner, 0.0),
-    ]
-};
+/// A place and time at which the ball can be met.
+#[derive(Debug, Clone, Copy)]
+struct Meeting {
+    /// The ball, footprint frame, m.
+    ball: [f64; 2],
+    /// Its velocity, m/s.
+    velocity: [f64; 2],
+    /// When, s after the plan; 0: as soon as can be.
+    at: f64,
+}
 
-/// How a foot and face would strike.
+/// How a foot and a part of it would strike: what is known without kinematics.
 #[derive(Debug, Clone, Copy)]
 struct Aim {
+    swing: Side,
+    face: Face,
+    meeting: Meeting,
     /// Direction of the strike, rad.
     direction: f64,
     point: FacePoint,
     /// The foot's, rad.
     yaw: f64,
-    /// The part of the cost that is known without kinematics.
+    /// Sole's centre at the contact, m.
+    contact: Vector3<f64>,
+    /// The part of the cost that is known; lower is better.
     cost: f64,
 }
 
@@ -116,8 +137,9 @@ pub(crate) struct Planned {
 pub(crate) struct Planner {
     rehearsal: Rehearsal,
     /// Shares of the joints' speed limits for each metre of the foot's way, for each metre that it rises, and for each radian
-    /// that it pitches up.
-    rates: [Vec<f64>; 3],
+    /// that it pitches up or turns.
+    rates: [Vec<f64>; 4],
+    aims: Vec<Aim>,
 }
 
 impl Planner {
@@ -125,6 +147,7 @@ impl Planner {
         Self {
             rehearsal: Rehearsal::new(body, &settings.manner(), ik, dynamics),
             rates: std::array::from_fn(|_| vec![0.0; body.robot.joints.len()]),
+            aims: Vec::new(),
         }
     }
 
@@ -136,14 +159,8 @@ impl Planner {
         request: &KickRequest,
     ) -> Result<Planned, Refusal> {
         request.check()?;
-        // When the contact comes decides where a moving ball is, and the other way round: two rounds settle it.
-        let moving = Vector2::from(request.ball_velocity).norm() > 0.02;
-        let mut contact = settings.times.shift + settings.times.settle + 3.0 * settings.times.foot_least;
-        if moving {
-            // One round without following the whole way tells the time well enough.
-            contact = self.plan_at(body, settings, request, contact, false)?.plan.contact;
-        }
-        let planned = self.plan_at(body, settings, request, if moving { contact } else { 0.0 }, true)?;
+        body.check_clear(request.ball)?;
+        let planned = self.best(body, settings, request)?;
         if let Some(deadline) = request.deadline
             && planned.plan.contact > deadline
         {
@@ -157,71 +174,74 @@ impl Planner {
         Ok(planned)
     }
 
-    /// Plans for a ball that is where it will be after `time` (s); `whole`: the best candidates' whole way is forecast.
-    fn plan_at(
-        &mut self,
-        body: &Body,
-        settings: &DynamicSettings,
-        request: &KickRequest,
-        time: f64,
-        whole: bool,
-    ) -> Result<Planned, Refusal> {
-        let (ball, velocity) = body.ball.roll(request.ball, request.ball_velocity, time);
-        check_place(body, ball, false)?;
+    /// The first of the likeliest ways to strike whose whole motion is possible.
+    fn best(&mut self, body: &Body, settings: &DynamicSettings, request: &KickRequest) -> Result<Planned, Refusal> {
+        self.aim(body, settings, request)?;
+        let aims = std::mem::take(&mut self.aims);
         let mut refusal: Option<Refusal> = None;
-        // What each would cost at least, cheapest first: once two are cheaper than all that are left, none of those can
-        // be one of the two best.
-        let mut waiting = WAYS.map(|(swing, face, turn)| {
-            let asked = request.foot.is_none_or(|foot| foot == swing);
-            let aim = if asked { self.aim(body, settings, request, velocity, swing, (face, turn)) } else { None };
-            aim.map(|aim| (swing, face, aim))
-        });
-        let least = |way: &Option<(Side, Face, Aim)>| way.as_ref().map_or(f64::INFINITY, |(_, _, aim)| aim.cost);
-        waiting.sort_by(|a, b| least(a).total_cmp(&least(b)));
-        let cost = |c: &Option<Candidate>| c.map_or(f64::INFINITY, |c| c.cost);
-        let mut candidates: [Option<Candidate>; 2] = [None; 2];
-        for (swing, face, aim) in waiting.into_iter().flatten() {
-            if cost(&candidates[1]) <= aim.cost {
+        let mut candidates: Vec<Candidate> = Vec::with_capacity(CANDIDATES + 1);
+        for aim in aims.iter().take(SCREENS) {
+            // Nothing that is left can be one of the best.
+            if candidates.len() == CANDIDATES && candidates.last().is_some_and(|last| last.cost <= aim.cost) {
                 break;
             }
-            match self.screen(body, settings, request, (ball, velocity), swing, face, &aim) {
-                Ok(found) if found.cost < cost(&candidates[0]) => candidates = [Some(found), candidates[0]],
-                Ok(found) if found.cost < cost(&candidates[1]) => candidates[1] = Some(found),
-                Ok(_) => {}
+            match self.screen(body, settings, request, aim) {
+                Ok(found) => {
+                    let place = candidates.partition_point(|known| known.cost <= found.cost);
+                    candidates.insert(place, found);
+                    candidates.truncate(CANDIDATES);
+                }
                 Err(cause) => refusal = Some(graver(refusal, cause)),
             }
         }
-        // The two best are enough: what neither can do, the sixth will not.
-        for candidate in candidates.iter().flatten() {
-            if !whole {
-                let motion = motion::kick(body, settings, &candidate.stroke);
-                return Ok(candidate.planned(settings, motion));
-            }
-            // What is too fast for the motors over one way may be possible over another, or a little slower.
-            for (windup, slower) in TRIES {
-                let mut tried = *candidate;
-                if candidate.slower * slower < SLOWEST {
+        self.aims = aims;
+        let mut left = FORECASTS;
+        for candidate in &candidates {
+            let (mut longest, mut pace, mut slower) = (f64::INFINITY, candidate.stroke.pace, 1.0);
+            let mut windups = WINDUPS.iter().copied();
+            let mut next = windups.next();
+            while let Some((windup, haste)) = next.filter(|_| left > 0) {
+                if windup >= longest {
+                    next = windups.next();
                     continue;
                 }
+                left -= 1;
+                let mut tried = *candidate;
                 tried.stroke.windup *= windup;
+                tried.stroke.haste = haste;
                 tried.stroke.speed *= slower;
+                tried.stroke.pace = pace;
                 tried.ball_speed *= slower;
                 let motion = motion::kick(body, settings, &tried.stroke);
+                // A foot that comes later than the ball misses it.
+                if tried.stroke.at > 0.0 && motion.contact.is_some_and(|contact| contact > tried.stroke.at + ON_TIME) {
+                    break;
+                }
                 let demands = Demands {
                     limits: &settings.limits,
                     foot_speed: tried.stroke.speed,
                     calm: [[1.0; 2], [LATE; 2]],
-                    roll: ROLL,
+                    roll: 0.0,
                     ground: GROUND,
+                    ball: (tried.stroke.at == 0.0).then_some(tried.stroke.ball),
                 };
-                match self.rehearsal.forecast(body, &motion, &demands) {
-                    Ok(()) => return Ok(tried.planned(settings, motion)),
-                    Err((cause, _)) => {
-                        let other = matches!(cause, Refusal::TooFast { .. } | Refusal::OffBalance { .. });
-                        refusal = Some(graver(refusal, cause));
-                        if !other {
-                            break;
-                        }
+                let Err((cause, strike)) = self.rehearsal.forecast(body, &motion, &demands) else {
+                    return Ok(tried.planned(settings, motion));
+                };
+                refusal = Some(graver(refusal, cause));
+                let least = SLOWEST / candidate.slower;
+                match cause {
+                    // Beside the strike there is time.
+                    Refusal::TooFast { .. } if !strike && pace * PACE < SLOW_MOST => pace *= PACE,
+                    // What is a little too fast is possible a little slower, else over another way.
+                    Refusal::TooFast { share, .. } if slower * AGAIN * settings.limits.speed / share > least => {
+                        slower *= AGAIN * (settings.limits.speed / share).min(1.0);
+                    }
+                    Refusal::TooFast { .. } | Refusal::OffBalance { .. } => next = windups.next(),
+                    // What is out of reach or in the way is so over any longer way.
+                    _ => {
+                        longest = windup;
+                        next = windups.next();
                     }
                 }
             }
@@ -229,64 +249,108 @@ impl Planner {
         Err(refusal.unwrap_or(Refusal::Unreachable { foot: Side::Right, place: Place::Contact, gap: f64::INFINITY }))
     }
 
-    /// Which way a foot and face must strike and how the foot must turn for it; `None` when it would have to turn too far.
-    fn aim(
-        &self,
+    /// Where and when the ball can be met: at rest where it lies, rolling at times from the soonest on until it rests.
+    fn meetings(body: &Body, settings: &DynamicSettings, request: &KickRequest) -> Vec<Meeting> {
+        let velocity = request.ball_velocity;
+        if Vector2::from(velocity).norm() <= RESTS {
+            return vec![Meeting { ball: request.ball, velocity: [0.0; 2], at: 0.0 }];
+        }
+        let t = &settings.times;
+        let soonest = t.shift + t.settle + 2.0 * t.foot_least + t.aim + 0.15;
+        let mut meetings = Vec::with_capacity(MEETINGS);
+        for i in 0..MEETINGS {
+            let at = soonest + i as f64 * MEETING_STEP;
+            let (ball, velocity) = body.ball.roll(request.ball, velocity, at);
+            meetings.push(Meeting { ball, velocity, at });
+            if Vector2::from(velocity).norm() <= RESTS {
+                break;
+            }
+        }
+        meetings
+    }
+
+    /// Fills `aims` with every way to strike that is not out of the question, the likeliest first: both feet, every face with the
+    /// foot turned as it needs, the rounded corners with the foot turned by steps; wherever a rolling ball comes by.
+    fn aim(&mut self, body: &Body, settings: &DynamicSettings, request: &KickRequest) -> Result<(), Refusal> {
+        self.aims.clear();
+        // Only the heel kicks what lies behind.
+        let heel = wrap(request.direction - PI).abs() <= settings.swing.yaw;
+        let mut refusal = None;
+        for meeting in Self::meetings(body, settings, request) {
+            if let Err(cause) = check_place(body, meeting.ball, heel) {
+                refusal = refusal.or(Some(cause));
+                continue;
+            }
+            // A moving ball keeps its speed: the impulse must point from it to the wanted velocity.
+            let velocity = Vector2::from(meeting.velocity);
+            let wanted = unit(request.direction) * request.strength.ball_speed(&body.ball, 1.0) - velocity;
+            let direction = if velocity.norm() > RESTS { wanted.y.atan2(wanted.x) } else { request.direction };
+            for swing in [Side::Left, Side::Right] {
+                if request.foot.is_some_and(|foot| foot != swing) {
+                    continue;
+                }
+                let foot = &body.feet[swing as usize];
+                for face in [Face::Front, Face::Inner, Face::Outer, Face::Back] {
+                    for slide in SLIDES {
+                        let mut point = foot.face(face, 0.0);
+                        point.axis += across(point.angle) * (slide * point.half_width);
+                        let yaw = wrap(direction - point.angle);
+                        let extra = if face == Face::Front { 0.0 } else { 0.3 } + 0.05 * slide.abs();
+                        self.add(body, settings, request, (swing, face, meeting), direction, (point, yaw, extra));
+                    }
+                }
+                for step in -YAWS..=YAWS {
+                    let yaw = f64::from(step) * YAW_STEP;
+                    let turned = wrap(direction - yaw);
+                    if (CORNER[0]..=CORNER[1]).contains(&turned.abs()) {
+                        let point = foot.face(Face::Corner, turned);
+                        self.add(body, settings, request, (swing, Face::Corner, meeting), direction, (point, yaw, 0.5));
+                    }
+                }
+            }
+        }
+        self.aims.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        match refusal.filter(|_| self.aims.is_empty()) {
+            Some(cause) => Err(cause),
+            None => Ok(()),
+        }
+    }
+
+    /// Adds one way to strike, with what is known of its cost, unless the foot would have to turn too far.
+    fn add(
+        &mut self,
         body: &Body,
         settings: &DynamicSettings,
         request: &KickRequest,
-        velocity: [f64; 2],
-        swing: Side,
-        (face, turn): (Face, f64),
-    ) -> Option<Aim> {
+        (swing, face, meeting): (Side, Face, Meeting),
+        direction: f64,
+        (point, yaw, extra): (FacePoint, f64, f64),
+    ) {
         let s = &settings.swing;
-        // A moving ball keeps its speed: the impulse must point from it to the wanted velocity.
-        let ball_velocity = Vector2::from(velocity);
-        let wanted = unit(request.direction) * request.strength.ball_speed(&body.ball, 1.0) - ball_velocity;
-        let direction = if ball_velocity.norm() > 0.02 { wanted.y.atan2(wanted.x) } else { request.direction };
-        let (point, yaw) = if face == Face::Corner {
-            let yaw = turn * direction;
-            let turned = wrap(direction - yaw);
-            // With the foot turned all the way both corners will do; the inner one reaches farther across.
-            let corner = if turned.abs() < 1e-9 { -1e-9 * Body::sign(swing) } else { turned };
-            (body.feet[swing as usize].face(face, corner), yaw)
-        } else {
-            let point = body.feet[swing as usize].face(face, 0.0);
-            (point, wrap(direction - point.angle))
-        };
-        let corner_range = (CORNER[0]..=CORNER[1]).contains(&point.angle.abs());
-        if yaw.abs() > s.yaw || (face == Face::Corner && !corner_range) {
-            return None;
+        if yaw.abs() > s.yaw {
+            return;
         }
-        let mut cost = 0.4 * yaw.abs() / FRAC_PI_4
-            + match face {
-                Face::Front => 0.0,
-                Face::Inner | Face::Outer | Face::Back => 0.3,
-                Face::Corner => 0.5,
-            };
+        let height = (body.ball.radius + s.height - point.axis.z).max(s.sole_least);
+        let center = Vector2::from(body.support_from_footprint(swing, meeting.ball));
+        let contact = contact_point(center, direction, &point, yaw, height, body.ball.radius);
+        let out = (contact - body.stand(swing).home).xy().norm() / body.leg_length - EASY;
+        let mut cost = extra + 0.4 * yaw.abs() / FRAC_PI_4 + 4.0 * out.max(0.0) + 0.1 * meeting.at;
         cost -= if paper_choice(request.ball, request.direction, s.corridor) == swing { 0.15 } else { 0.0 };
         cost -= if paper_face(swing, request.direction) == face { 0.15 } else { 0.0 };
-        Some(Aim { direction, point, yaw, cost })
+        self.aims.push(Aim { swing, face, meeting, direction, point, yaw, contact, cost });
     }
 
     /// Looks whether a foot and face reach the three places.
-    #[allow(clippy::too_many_arguments, reason = "one request, one ball, one foot")]
     fn screen(
         &mut self,
         body: &Body,
         settings: &DynamicSettings,
         request: &KickRequest,
-        (ball, velocity): ([f64; 2], [f64; 2]),
-        swing: Side,
-        face: Face,
         aim: &Aim,
     ) -> Result<Candidate, Refusal> {
         let s = &settings.swing;
-        let ball_velocity = Vector2::from(velocity);
-        let Aim { direction, point, yaw, .. } = *aim;
-        let height = (body.ball.radius + s.height - point.axis.z).max(s.sole_least);
-        let center = Vector2::from(body.support_from_footprint(swing, ball));
-        let contact = contact_point(center, direction, &point, yaw, height, body.ball.radius);
+        let Aim { swing, face, direction, point, yaw, contact, .. } = *aim;
+        let ball_velocity = Vector2::from(aim.meeting.velocity);
         let mut stroke = Stroke {
             swing,
             face,
@@ -296,9 +360,16 @@ impl Planner {
             windup: s.windup,
             follow: s.follow,
             speed: 1.0,
+            haste: 2.0,
             axis: point.axis,
             pitch: s.pitch,
             rise: 0.0,
+            turn: 0.0,
+            bend: [0.0; 5],
+            lowest: s.sole_least,
+            pace: 1.0,
+            at: aim.meeting.at,
+            ball: body.support_from_footprint(swing, aim.meeting.ball).into(),
         };
 
         // Contact first: where it is out of reach, nothing else matters.
@@ -335,6 +406,9 @@ impl Planner {
         if let (None, Some(cause)) = (fits, failure) {
             return Err(cause);
         }
+        // No joint may have to hurry on the way there.
+        let (most, _) = self.rehearsal.from_lifted(body, swing, motion::retraction_time(body, settings, &stroke));
+        stroke.pace = (PEAK * most / settings.limits.speed).clamp(1.0, SLOW_MOST);
         let fits = [1.0, 0.5, 0.0].into_iter().find_map(|share| {
             stroke.follow = s.follow * (0.3 + 0.7 * share);
             self.rehearsal.angles.copy_from_slice(&self.rehearsal.saved);
@@ -346,59 +420,80 @@ impl Planner {
         }
         // All that is added to the aim's cost is at least zero: the search leaves off by it.
         let mut cost = aim.cost + ease.0 / settings.limits.speed;
-        cost += 0.8 * (1.0 - stroke.windup / s.windup) + 0.3 * (1.0 - stroke.follow / s.follow);
+        cost += 0.8 * (1.0 - stroke.windup / s.windup) + 0.3 * (1.0 - stroke.follow / s.follow) + 2.0 * (1.0 - slower);
         cost += 0.3 * (1.0 - limit / 0.1).clamp(0.0, 1.0);
         Ok(Candidate { stroke, cost, ball_speed: ball_speed * slower, slower })
     }
 
-    /// Chooses how the foot pitches and rises at the contact so that the joints' speeds are easiest, for a stroke whose contact
-    /// pose is in `saved`: a straight way of a level foot lets one joint bind while others have much left. Gives the largest share
-    /// of a joint's speed limit that is left, and its joint.
+    /// Chooses how the foot pitches, rises and turns at the contact so that the joints' speeds are easiest, for a stroke whose
+    /// contact pose is in `saved`: a straight way of a level foot lets one joint bind while others have much left. Gives the
+    /// largest share of a joint's speed limit that is left, and its joint.
     fn ease(&mut self, body: &Body, settings: &DynamicSettings, stroke: &mut Stroke) -> (f64, usize) {
-        let base = Stroke { pitch: 0.0, rise: 0.0, ..*stroke };
+        let base = Stroke { pitch: 0.0, rise: 0.0, turn: 0.0, ..*stroke };
+        let trunk = settings.manner().trunk_support(body, stroke.swing, stroke.yaw);
         let (ahead, here) = (base.pose(WAY), base.pose(0.0));
-        let moved = |axis: usize, by: f64| {
-            let mut pose = here;
-            pose[axis] += by;
-            pose
-        };
-        // Turning about the face moves the sole: the pose of a pitch by WAY x 1 rad/m, less the way itself.
-        let pitched = {
-            let mut pose = Stroke { pitch: 1.0, ..base }.pose(WAY);
+        let mut up = here;
+        up[2] += WAY;
+        // Turning about the face moves the sole: the pose of a turn by WAY x 1 rad/m, less the way itself.
+        let turned = |stroke: Stroke| {
+            let mut pose = stroke.pose(WAY);
             (0..3).for_each(|axis| pose[axis] += here[axis] - ahead[axis]);
             pose
         };
-        let trunk = settings.manner().trunk_support(body, stroke.swing, stroke.yaw);
+        let (pitched, yawed) = (turned(Stroke { pitch: 1.0, ..base }), turned(Stroke { turn: 1.0, ..base }));
         let tried = &mut self.rehearsal;
-        for (rates, pose) in self.rates.iter_mut().zip([ahead, moved(2, WAY), pitched]) {
+        for (rates, pose) in self.rates.iter_mut().zip([ahead, up, pitched, yawed]) {
             tried.angles.copy_from_slice(&tried.saved);
-            tried.go(body, stroke.swing, &goals(&pose, &trunk), NEAR, ROLL);
+            tried.go(body, stroke.swing, &goals(&pose, &trunk), NEAR, 0.0);
             for (j, rate) in rates.iter_mut().enumerate() {
                 *rate = (tried.angles[j] - tried.saved[j]) / WAY / body.robot.joints[j].speed;
             }
         }
-        let [way, up, turn] = &self.rates;
+        let [way, up, pitches, turns] = &self.rates;
+        // The foot pitches about the face's axis toward the front or heel, not about its side.
+        let forward = stroke.axis.x.signum() * f64::from(u8::from(stroke.axis.x.abs() > stroke.axis.y.abs()));
         // A quintic that comes from the contact's height and rises at the end dips by 0.38 of the rise times the wind-up.
         let most_rise = (stroke.contact.z - settings.swing.sole_least).max(0.0) / (0.38 * settings.swing.windup);
-        let mut best = (f64::INFINITY, (0.0, 0));
-        let (default, calm) = (stroke.pitch, CALM * settings.limits.speed);
-        for p in 0..=PITCHES {
-            for r in 0..=RISES {
-                let pitch = default + f64::from(p) * PITCH_STEP;
-                let rise = f64::from(r) * RISE_STEP;
-                if rise > most_rise {
-                    break;
-                }
-                let share = (0..way.len())
-                    .map(|j| (stroke.speed * (way[j] + rise * up[j] + pitch * turn[j]).abs(), j))
-                    .fold((0.0, 0), |most, next| if next.0 > most.0 { next } else { most });
-                let cost = share.0.max(calm) + 0.02 * (pitch - default) + 0.3 * rise;
-                if cost < best.0 {
-                    best = (cost, share);
-                    (stroke.pitch, stroke.rise) = (pitch, rise);
+        let calm = CALM * settings.limits.speed;
+        let rate =
+            |j: usize, [pitch, rise, turn]: [f64; 3]| way[j] + rise * up[j] + pitch * pitches[j] + turn * turns[j];
+        let judged = |[pitch, rise, turn]: [f64; 3]| {
+            let share = (0..way.len())
+                .map(|j| (stroke.speed * rate(j, [pitch, rise, turn]).abs(), j))
+                .fold((0.0, 0), |most, next| if next.0 > most.0 { next } else { most });
+            (share.0.max(calm) + 0.02 * (pitch - stroke.pitch).abs() + 0.3 * rise + 0.02 * turn.abs(), share)
+        };
+        // One after the other, twice: what is minimised is convex in the three.
+        let mut chosen = [stroke.pitch * forward, 0.0, 0.0];
+        let mut best = judged(chosen);
+        for _ in 0..2 {
+            for (k, [step, count], low) in [(0, PITCH, -PITCH[1]), (1, RISE, 0.0), (2, TURN, -TURN[1])] {
+                let mut next = chosen;
+                for i in low as i32..=count as i32 {
+                    next[k] = f64::from(i) * step;
+                    if (k == 0 && next[0] * forward < 0.0) || (k == 1 && next[1] > most_rise) {
+                        continue;
+                    }
+                    let found = judged(next);
+                    if found.0 < best.0 {
+                        (best, chosen) = (found, next);
+                    }
                 }
             }
         }
+        [stroke.pitch, stroke.rise, stroke.turn] = chosen;
+        // Where the foot would be if every joint went back at its rate: the way of a swing rather than a straight line.
+        let tried = &mut self.rehearsal;
+        for j in 0..way.len() {
+            let [low, high] = body.robot.joints[j].range;
+            let back = stroke.windup * rate(j, chosen) * body.robot.joints[j].speed;
+            tried.angles[j] = (tried.saved[j] - back).clamp(low, high);
+        }
+        let Rehearsal { pose, angles, .. } = tried;
+        body.tree.update(angles, pose);
+        let back = body.foot_in_support(pose, stroke.swing);
+        let (here, slope, way) = (stroke.pose(0.0), stroke.slope(), stroke.windup);
+        stroke.bend = std::array::from_fn(|k| 2.0 * (back[k] - here[k] + way * slope[k]) / (way * way));
         best.1
     }
 
@@ -413,9 +508,14 @@ impl Planner {
         steps: usize,
     ) -> Result<(), Refusal> {
         let trunk = settings.manner().trunk_support(body, stroke.swing, stroke.yaw);
-        let gap = self.rehearsal.go(body, stroke.swing, &goals(&foot, &trunk), steps, ROLL);
+        let gap = self.rehearsal.go(body, stroke.swing, &goals(&foot, &trunk), steps, 0.0);
         judge(body, &settings.limits, &self.rehearsal.pose, stroke.swing, what, gap)
     }
+}
+
+/// Toward the left of `angle` (rad).
+fn across(angle: f64) -> Vector3<f64> {
+    Vector3::new(-angle.sin(), angle.cos(), 0.0)
 }
 
 fn unit(angle: f64) -> Vector2<f64> {

@@ -35,6 +35,7 @@ use crate::engine::{KickEngine, KickPlan, Phase, Progress};
 use crate::ik::{Goals, Ik, Residual};
 use crate::request::{KickRequest, Refusal};
 use crate::settings::Settings;
+use crate::stand::{self, Standing};
 use crate::tree::{Tree, TreePose};
 use crate::whole_body::balance::Balance;
 use crate::whole_body::body::Body;
@@ -380,6 +381,11 @@ impl KickEngine for PreviewKick {
         self.start(planned.motion, false);
         self.course = Course::started(request.hold);
         Ok(planned.plan)
+    }
+
+    fn where_to_stand(&mut self, request: &KickRequest) -> Option<Standing> {
+        let Self { planner, body, settings, regulator, .. } = self;
+        stand::nearest(body, request, |asked| planner.plan(body, settings, regulator, asked).is_ok())
     }
 
     fn release(&mut self) {

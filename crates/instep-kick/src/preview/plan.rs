@@ -99,6 +99,7 @@ impl Planner {
         request: &KickRequest,
     ) -> Result<Planned, Refusal> {
         request.check()?;
+        body.check_clear(request.ball)?;
         // When the contact comes decides where a moving ball is, and the other way round: two rounds settle it.
         let mut contact = settings.times.shift + 3.0 * settings.times.foot_least;
         let moving = Vector2::from(request.ball_velocity).norm() > 0.02;

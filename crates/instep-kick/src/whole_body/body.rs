@@ -11,8 +11,18 @@ use nalgebra::{Rotation2, Rotation3, Vector2, Vector3};
 use crate::KickError;
 use crate::ball::BallModel;
 use crate::request::Refusal;
-use crate::tree::{Tree, TreePose};
+use crate::tree::{Capsule, Tree, TreePose};
 use crate::whole_body::foot::Foot;
+
+/// Gap between ball and rising foot, in units of the leg's length.
+const AWAY: f64 = 0.08;
+
+/// Distance of a point from a segment, m.
+fn apart(point: &Vector3<f64>, [a, b]: &[Vector3<f64>; 2]) -> f64 {
+    let along = b - a;
+    let share = (along.dot(&(point - a)) / along.norm_squared().max(1e-18)).clamp(0.0, 1.0);
+    (point - a - along * share).norm()
+}
 
 /// The robot standing, in the frame of one sole.
 #[derive(Debug, Clone, Copy)]
@@ -47,6 +57,10 @@ pub(crate) struct Body {
     pub(crate) half_width: f64,
     /// Length of the straight leg from hip to sole, m.
     pub(crate) leg_length: f64,
+    /// What of the left and right leg may strike a ball.
+    pub(crate) strikers: [Vec<Capsule>; 2],
+    /// The same of both legs in the stand, in the left sole's frame: ends of the axis and radius, m.
+    standing: Vec<([Vector3<f64>; 2], f64)>,
 }
 
 /// The ankle roll joint of the leg on `side`, without which nobody stands on one foot.
@@ -101,7 +115,13 @@ impl Body {
                 Ok((joint, angles[joint], angle))
             })
             .collect::<Result<_, _>>()?;
-        Ok(Self { robot, ball, tree, feet, stands, angles, arms, half_width, leg_length })
+        let strikers = [Side::Left, Side::Right]
+            .map(|side| robot.leg(side).strike.iter().map(|&geom| tree.capsule(&robot, geom)).collect::<Vec<_>>());
+        let left = robot.leg(Side::Left).sole;
+        let (turn, sole) = (pose.rotation[left.link].transpose(), pose.point(&left));
+        let place = |capsule: &Capsule| (pose.axis_of(capsule).map(|end| turn * (end - sole)), capsule.radius);
+        let standing = strikers.iter().flatten().map(place).collect();
+        Ok(Self { robot, ball, tree, feet, stands, angles, arms, half_width, leg_length, strikers, standing })
     }
 
     /// Sets the joints that are no leg's: `share` 0 is the stand, 1 the foot up.
@@ -153,6 +173,15 @@ impl Body {
         Ok(())
     }
 
+    /// The swing sole's x, y, z (m), yaw and pitch (rad) in the support sole's frame, in `pose`.
+    pub(crate) fn foot_in_support(&self, pose: &TreePose, swing: Side) -> [f64; 5] {
+        let (support, flying) = (self.robot.leg(swing.other()).sole, self.robot.leg(swing).sole);
+        let turn = pose.rotation[support.link].transpose();
+        let at = turn * (pose.point(&flying) - pose.point(&support));
+        let (_, pitch, yaw) = Rotation3::from_matrix_unchecked(turn * pose.rotation[flying.link]).euler_angles();
+        [at.x, at.y, at.z, yaw, pitch]
+    }
+
     /// Where a ball that is seen at `seen` (m, from the base's ground projection, in its heading) is in the support
     /// sole's frame, for a robot in `pose`.
     pub(crate) fn sighted(&self, pose: &TreePose, swing: Side, seen: [f64; 3]) -> Vector2<f64> {
@@ -167,6 +196,38 @@ impl Body {
     pub(crate) fn support_from_footprint(&self, swing: Side, point: [f64; 2]) -> [f64; 2] {
         let support_y = if swing == Side::Left { -self.half_width } else { self.half_width };
         [point[0], point[1] - support_y]
+    }
+
+    /// Refuses a ball (m, footprint frame) that touches the robot in its stand.
+    ///
+    /// # Errors
+    /// [`Refusal::BallUnderRobot`].
+    pub(crate) fn check_clear(&self, ball: [f64; 2]) -> Result<(), Refusal> {
+        let [x, y] = self.support_from_footprint(Side::Right, ball);
+        let centre = Vector3::new(x, y, self.ball.radius);
+        let gaps = self.standing.iter().map(|(ends, radius)| apart(&centre, ends) - radius - self.ball.radius);
+        let gap = gaps.fold(f64::INFINITY, f64::min);
+        if gap <= 0.0 { Err(Refusal::BallUnderRobot { gap, least: 0.0 }) } else { Ok(()) }
+    }
+
+    /// Gap between a ball at `ball` (m, in the support sole's frame, on the ground) and the swing leg in `pose`, m.
+    pub(crate) fn gap_to_ball(&self, pose: &TreePose, swing: Side, ball: Vector2<f64>) -> f64 {
+        let sole = &self.robot.leg(swing.other()).sole;
+        let centre = pose.rotation[sole.link] * Vector3::new(ball.x, ball.y, self.ball.radius) + pose.point(sole);
+        let gap = |capsule: &Capsule| apart(&centre, &pose.axis_of(capsule)) - capsule.radius - self.ball.radius;
+        self.strikers[swing as usize].iter().map(gap).fold(f64::INFINITY, f64::min)
+    }
+
+    /// How far the swing foot goes from a ball at `ball` (m, support sole's frame) while it rises, m: a ball that nearly touches it
+    /// must not be brushed.
+    pub(crate) fn away(&self, swing: Side, ball: Vector2<f64>) -> [f64; 2] {
+        let (home, foot) = (self.stand(swing).home.xy(), &self.feet[swing as usize]);
+        let ([back, front], [right, left]) = (foot.outline_x, foot.outline_y);
+        let at = ball - home;
+        let off = at - Vector2::new(at.x.clamp(back, front), at.y.clamp(right, left));
+        let gap = off.norm() - self.ball.radius;
+        let by = (AWAY * self.leg_length - gap).max(0.0);
+        off.try_normalize(1e-9).map_or([0.0; 2], |off| (-off * by).into())
     }
 
     /// +1 for a left, -1 for a right swing foot: the side of the swing foot as seen from the support foot.

@@ -3,7 +3,7 @@
 
 use instep_motion::phase::Side;
 use instep_robot::Robot;
-use nalgebra::Vector3;
+use nalgebra::{Vector2, Vector3};
 
 use crate::engine::Phase;
 use crate::ik::{Goals, Ik, Residual};
@@ -29,6 +29,8 @@ pub(crate) const TIPPING: f64 = 0.04;
 /// Sampling of the forecast, s: in the strike, and elsewhere.
 const FINE: f64 = 0.016;
 const COARSE: f64 = 0.03;
+/// Least gap between ball and swing leg before the strike, m.
+const UNTOUCHED: f64 = 0.002;
 /// Weight of the swing foot's roll in a miss, m/rad, where it counts.
 pub(crate) const ROLL: f64 = 0.03;
 
@@ -97,7 +99,7 @@ pub(crate) fn fastest(
 /// The cause.
 pub(crate) fn check_place(body: &Body, ball: [f64; 2], heel: bool) -> Result<(), Refusal> {
     let distance = ball[0].hypot(ball[1]);
-    let reach = body.leg_length + body.ball.radius;
+    let reach = body.leg_length + body.feet[0].outline_x[1] + body.ball.radius;
     if distance > reach {
         return Err(Refusal::TooFar { distance, reach });
     }
@@ -122,7 +124,7 @@ pub(crate) fn graver(old: Option<Refusal>, new: Refusal) -> Refusal {
     let rank = |r: &Refusal| match r {
         Refusal::Unreachable { place: Place::Contact, gap, .. } => -gap.min(10.0),
         Refusal::Unreachable { gap, .. } => 1.0 - gap.min(0.9),
-        Refusal::SelfCollision { .. } | Refusal::HitsGround { .. } => 2.0,
+        Refusal::SelfCollision { .. } | Refusal::HitsGround { .. } | Refusal::BrushesBall { .. } => 2.0,
         Refusal::OffBalance { .. } | Refusal::TooHeavy { .. } => 3.0,
         Refusal::TooFast { share, .. } => 5.0 - (share / 100.0).min(0.9),
         Refusal::TooStrong { asked, most, .. } => 5.0 - (asked / most / 100.0).min(0.9),
@@ -147,6 +149,8 @@ pub(crate) struct Demands<'a> {
     pub(crate) roll: f64,
     /// Least height of any point of the swing foot over the ground, m.
     pub(crate) ground: f64,
+    /// A ball at rest in the support sole's frame, m: it may not be touched before the strike.
+    pub(crate) ball: Option<Vector2<f64>>,
 }
 
 /// Scratch space in which poses and motions are tried.
@@ -176,6 +180,11 @@ impl Rehearsal {
     /// Starts with the foot of `swing` lifted over its place.
     pub(crate) fn lift(&mut self, swing: Side) {
         self.angles.copy_from_slice(&self.lifted[swing as usize]);
+    }
+
+    /// The joint that goes the farthest share of its speed limit from the lifted foot to the present angles in `time` (s).
+    pub(crate) fn from_lifted(&self, body: &Body, swing: Side, time: f64) -> (f64, usize) {
+        fastest(&body.robot, self.ik.joints(), &self.lifted[swing as usize], &self.angles, time)
     }
 
     /// Goes to `goals` by at most `steps` of inverse kinematics; gives how far it misses them, m.
@@ -233,6 +242,12 @@ impl Rehearsal {
             let gap = ground_gap(body, &self.pose, swing);
             if gap < demands.ground {
                 return refused(Refusal::HitsGround { foot: swing, gap });
+            }
+            if let Some(ball) = demands.ball.filter(|_| time < strike[0]) {
+                let gap = body.gap_to_ball(&self.pose, swing, ball);
+                if gap < UNTOUCHED {
+                    return refused(Refusal::BrushesBall { foot: swing, gap });
+                }
             }
             if quick {
                 if fine == 0 {

@@ -13,6 +13,7 @@ pub(crate) mod path;
 mod settings;
 pub(crate) mod timeline;
 pub(crate) mod torque;
+pub(crate) mod watch;
 
 pub use inclination::Inclination;
 pub use settings::{Feedback, Limits, Pid, Stance, Times};

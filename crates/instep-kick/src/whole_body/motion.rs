@@ -95,15 +95,17 @@ impl Motion {
         }
     }
 
-    /// From the stand to the foot lifted over its place.
-    pub(crate) fn raised(body: &Body, manner: &Manner<'_>, swing: Side) -> Self {
+    /// From the stand to the foot lifted over its place, or `away` (m) from there.
+    pub(crate) fn raised(body: &Body, manner: &Manner<'_>, swing: Side, away: [f64; 2]) -> Self {
         let mut motion = Self::standing(body, swing);
         let times = manner.times;
         motion.trunk.to(times.shift, State::at_rest(manner.trunk_support(body, swing, 0.0)));
         motion.trunk.hold(times.settle);
         motion.foot.hold(times.shift + times.settle);
         motion.timeline.end_at(Phase::Shift, motion.foot.end());
-        motion.foot.to(times.foot_least, State::at_rest(body.lifted(swing, manner.lift)));
+        let mut lifted = body.lifted(swing, manner.lift);
+        (0..2).for_each(|k| lifted[k] += away[k]);
+        motion.foot.to(times.foot_least, State::at_rest(lifted));
         motion.trunk.hold(times.foot_least);
         motion.timeline.end_at(Phase::Raise, motion.foot.end());
         motion

@@ -6,7 +6,7 @@
 use instep_motion::spline::{Quintic, State};
 
 /// Most segments.
-const SEGMENTS: usize = 12;
+const SEGMENTS: usize = 16;
 
 /// A curve in `D` coordinates.
 #[derive(Debug, Clone, Copy)]

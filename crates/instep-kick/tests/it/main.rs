@@ -4,6 +4,7 @@
 mod allocation;
 mod cancel;
 mod catch;
+mod faults;
 mod follow;
 mod issue_304;
 mod kinematics;

@@ -48,6 +48,8 @@ pub(crate) struct Rig {
     pub(crate) sensors: Sensors,
     pub(crate) command: JointCommand,
     far: usize,
+    /// The engine is not told what is seen of the ball.
+    pub(crate) blind: bool,
 }
 
 impl Rig {
@@ -68,13 +70,16 @@ impl Rig {
         let mut sensors = Sensors::default();
         suite.read_into(0.0, &mut sensors);
         let far = (engine.control_period() / settings.step.tick).round() as usize;
-        Self { engine, world, suite, sensors, command: JointCommand::zeros(robot.joints.len()), far }
+        Self { engine, world, suite, sensors, command: JointCommand::zeros(robot.joints.len()), far, blind: false }
     }
 
     /// One control period.
     pub(crate) fn tick(&mut self) {
         use instep_robot::control::Controller;
         self.suite.read_into(self.world.time(), &mut self.sensors);
+        if self.blind {
+            self.sensors.ball = None;
+        }
         self.engine.tick(&self.sensors, &mut self.command);
         for _ in 0..self.far {
             self.world.advance(&self.command, None).unwrap();

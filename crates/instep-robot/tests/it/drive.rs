@@ -173,6 +173,7 @@ fn drives_and_senses_that_cannot_be_are_refused_with_their_key() {
         ("dead_zone = 0.0015", "dead_zone = -1", "group[0].dead_zone", "within the joint's range"),
         ("static_friction = 0.084", "static_friction = 9", "group[0].static_friction", "at most the torque"),
         ("pid = { p = 10.55 }", "pid = { p = 0.0 }", "group[0].pid.p", "above 0"),
+        ("pid = { p = 10.55 }", "pid = { p = 0.5 }", "group[0].pid.p", "for its torque limit of 1.674 N m"),
         ("delay = 0.012", "delay = -0.012", "senses.delay", "0 to 0.2 s"),
         ("gyro_bias = 0.01", "gyro_bias = -1.0", "senses.gyro_bias", "at least 0"),
         ("link = \"Head\"", "link = \"Haed\"", "senses.camera.link", "nearest is \"Head\""),

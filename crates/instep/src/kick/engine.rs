@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use instep_bench::Subject;
 use instep_bench::cell::{Kicked, Ran, run_case};
 use instep_bench::scenario::Case;
-use instep_kick::KickRequest;
+use instep_kick::{KickRequest, Standing};
 use instep_motion::text;
 use instep_sim::World;
 use instep_sim::audit::{Audit, Rerun};
@@ -44,6 +44,9 @@ struct Answer {
 struct Refused {
     cause: &'static str,
     message: String,
+    /// Where the robot could stand for this kick: `position` in metres in its present footprint frame, `heading` in radians to the
+    /// left; null where no place near will do.
+    stand: Option<Standing>,
 }
 
 /// Where files go.
@@ -87,7 +90,17 @@ pub(super) fn run(
     for request in requests {
         let case = Case::of(request, seed);
         let (outcome, plan_s, ran) = run_case(subject, engine, &case, &mut world, &mut Vec::new())?;
-        let refused = outcome.as_ref().err().map(|r| Refused { cause: r.name(), message: r.explain(&subject.robot) });
+        let refused = match &outcome {
+            Ok(_) => None,
+            Err(refusal) => {
+                let stand = subject.engine(engine)?.where_to_stand(request);
+                let mut message = refusal.explain(&subject.robot);
+                if let Some(stand) = &stand {
+                    message = format!("{message}; {}", stand.text());
+                }
+                Some(Refused { cause: refusal.name(), message, stand })
+            }
+        };
         let kicked = outcome.ok();
         let direction_error_deg = kicked.and_then(|k| k.direction_error).map(f64::to_degrees);
         if let (Some(folder), Some(ran)) = (kept, &ran) {
