@@ -177,8 +177,8 @@ pub fn team(frame: &Frame, rect: &Rect) -> Option<Team> {
     }
 }
 
-/// Confidence above which the shipped detector's finds of each class are used: where nine of ten are right; a ball's where less
-/// than one frame in a thousand has a false one.
+/// Confidence above which the shipped detector's finds of each class are used: where nine of ten are right; a ball's where
+/// few frames in a thousand have a false one.
 pub const THRESHOLDS: [f32; Class::ALL.len()] = [0.6, 0.5, 0.35, 0.5, 0.55, 0.45];
 
 impl Detection {
