@@ -55,7 +55,7 @@ mod tests {
         assert_eq!(turned(&[], 0.0), 0.0);
         // Far ahead the ball alone passes.
         assert_eq!(turned(&[[3.2, 1.0], [1.0, 2.0]], 0.0), 0.0);
-        let past = turned(&[[1.4, 0.7]], 0.0);
+        let past = turned(&[[1.6, 0.6]], 0.0);
         assert!(past > 0.2, "away from the one on the right: {past}");
         // In the way of the run-up: the robot begins on the other side of its line.
         let behind = turned(&[[-0.5, 1.3]], 0.0);
@@ -65,8 +65,8 @@ mod tests {
 
     #[test]
     fn what_was_chosen_is_kept_while_it_is_as_good_and_where_nothing_helps_nothing_is_done() {
-        let ahead = [[1.3, 1.0]];
-        let (left, right) = (turned(&ahead, 0.8), turned(&ahead, -0.8));
+        let ahead = [[1.65, 1.0]];
+        let (left, right) = (turned(&ahead, 1.3), turned(&ahead, -1.3));
         assert!(left > 0.0 && right < 0.0, "{left} {right}");
         assert_eq!(turned(&[[1.3, 1.1]], 0.4), 0.0, "nobody passes one so near to the ball");
     }
