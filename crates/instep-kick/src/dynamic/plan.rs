@@ -407,7 +407,7 @@ impl Planner {
             return Err(cause);
         }
         // No joint may have to hurry on the way there.
-        let (most, _) = self.rehearsal.from_lifted(body, swing, motion::retraction_time(body, settings, &stroke));
+        let (most, _) = self.rehearsal.haste_from_lift(body, swing, motion::retraction_time(body, settings, &stroke));
         stroke.pace = (PEAK * most / settings.limits.speed).clamp(1.0, SLOW_MOST);
         let fits = [1.0, 0.5, 0.0].into_iter().find_map(|share| {
             stroke.follow = s.follow * (0.3 + 0.7 * share);

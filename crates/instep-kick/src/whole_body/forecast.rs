@@ -183,7 +183,7 @@ impl Rehearsal {
     }
 
     /// The joint that goes the farthest share of its speed limit from the lifted foot to the present angles in `time` (s).
-    pub(crate) fn from_lifted(&self, body: &Body, swing: Side, time: f64) -> (f64, usize) {
+    pub(crate) fn haste_from_lift(&self, body: &Body, swing: Side, time: f64) -> (f64, usize) {
         fastest(&body.robot, self.ik.joints(), &self.lifted[swing as usize], &self.angles, time)
     }
 
