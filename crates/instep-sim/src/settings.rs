@@ -239,7 +239,7 @@ impl WorldSettings {
         }
         positive("model_error.mass", self.model_error.mass)?;
         for shift in self.model_error.base_shift {
-            check("model_error.base_shift", shift, shift.abs() <= 0.2, "a shift of at most 0.2 m")?;
+            check("model_error.base_shift", shift, shift.abs() <= 0.3, "a shift of at most 0.3 m")?;
         }
         let friction = self.model_error.joint_friction;
         check("model_error.joint_friction", friction, (0.0..=0.5).contains(&friction), "a share in [0, 0.5]")?;

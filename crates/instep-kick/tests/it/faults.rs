@@ -1,4 +1,4 @@
-//! Faults that were found, each with a test that has failed.
+//! Faults that were found, each with a test.
 
 use std::sync::Arc;
 
