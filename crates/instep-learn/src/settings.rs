@@ -318,7 +318,8 @@ impl LearnSettings {
     /// The second stage of paper 1: from a policy that follows its reference to one that kicks the ball, with the values of the
     /// shipped policy's last millions of steps. Little exploration and a loose threshold; start errors half as large again as
     /// those of trials, mostly at the clip's start, where trials start; a ball that is worth less than a fall costs; the world as
-    /// built, a little different for each environment, in its own step; and joint speeds held well below their limits, for a landing is short and hard.
+    /// built, a little different for each environment, in its own step; and joint speeds held well below their limits, for a
+    /// landing is short and hard.
     #[must_use]
     pub fn ball() -> Self {
         Self {
@@ -470,5 +471,37 @@ impl LearnSettings {
         let ratio = period / self.world.step;
         let whole = (ratio - ratio.round()).abs() < 1e-6 && ratio.round() >= 1.0;
         check("world.step", self.world.step, whole, "a whole fraction of follower.period")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng as _;
+
+    #[test]
+    fn worlds_differ_within_the_spread_and_not_without_one() {
+        let plain = instep_sim::settings::WorldSettings::default();
+        let drawn = |spread: Spread, seed| {
+            let mut world = plain;
+            spread.draw(&mut world, &mut ChaCha8Rng::seed_from_u64(seed));
+            world
+        };
+        assert_eq!(drawn(Spread::default(), 1), plain);
+        let spread = Spread { mass: 0.1, base_shift: 0.02, friction: 0.3, delay: 0.01, restitution: 0.05 };
+        let worlds: Vec<_> = (0..200).map(|seed| drawn(spread, seed)).collect();
+        let spans = |of: fn(&instep_sim::settings::WorldSettings) -> f64, middle: f64, low: f64, high: f64| {
+            let off: Vec<f64> = worlds.iter().map(|world| of(world) - middle).collect();
+            let (least, most) = off.iter().fold((f64::MAX, f64::MIN), |(a, b), x| (a.min(*x), b.max(*x)));
+            // All within, and all of it used.
+            assert!(least >= low && most <= high && most - least > 0.9 * (high - low), "{least} {most}, {low} {high}");
+        };
+        spans(|w| w.model_error.mass, 1.0, -0.1, 0.1);
+        spans(|w| w.model_error.base_shift[0], 0.0, -0.02, 0.02);
+        spans(|w| w.model_error.base_shift[1], 0.0, -0.02, 0.02);
+        spans(|w| w.pitch.friction, plain.pitch.friction, -0.3, 0.3);
+        spans(|w| w.impact.restitution, plain.impact.restitution, -0.05, 0.05);
+        spans(|w| w.sensors.delay, 0.0, 0.0, 0.01);
+        assert!(worlds.iter().all(|world| world.model_error.base_shift[2] == 0.0));
     }
 }

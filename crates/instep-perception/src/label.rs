@@ -64,6 +64,13 @@ impl Rect {
         }
     }
 
+    /// Widened about its middle to [`LEAST_WIDTH`], where it is narrower.
+    #[must_use]
+    pub fn widened(self) -> Rect {
+        let more = (LEAST_WIDTH - self.width()).max(0.0) / 2.0;
+        Rect { left: self.left - more, right: self.right + more, ..self }
+    }
+
     /// Intersection over union.
     pub fn iou(&self, other: &Rect) -> f32 {
         let meet = self.meet(other).area();
@@ -94,15 +101,6 @@ pub const LANDMARK_WIDTH: f32 = 0.6;
 
 /// Least width of a post's box, pixels: one and a half cells of the network's maps.
 pub const LEAST_WIDTH: f32 = 6.0;
-
-impl Rect {
-    /// Widened about its middle to [`LEAST_WIDTH`], where it is narrower.
-    #[must_use]
-    pub fn widened(self) -> Rect {
-        let more = (LEAST_WIDTH - self.width()).max(0.0) / 2.0;
-        Rect { left: self.left - more, right: self.right + more, ..self }
-    }
-}
 
 /// The box of an intersection whose point falls on a pixel, `depth` m ahead.
 pub fn intersection_rect(camera: &Camera, pixel: [f32; 2], depth: f32) -> Rect {
@@ -202,5 +200,18 @@ fn asked_for(camera: &Camera, thing: &Thing, place: Vector3<f32>, rect: &Rect, p
             let whole = f * 2.0 * thing.size / place.z.max(0.3);
             pixels >= 90.0 && pixels >= 0.04 * whole * whole.min(camera.height as f32)
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_narrow_box_is_widened_about_its_middle_and_a_wide_one_stays() {
+        let narrow = Rect { left: 10.0, top: 3.0, right: 12.0, low: 40.0 }.widened();
+        assert_eq!(narrow, Rect { left: 8.0, top: 3.0, right: 14.0, low: 40.0 });
+        let wide = Rect { left: 10.0, top: 3.0, right: 17.0, low: 40.0 };
+        assert_eq!(wide.widened(), wide);
     }
 }

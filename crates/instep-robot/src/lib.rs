@@ -28,9 +28,11 @@ mod robot;
 pub mod senses;
 pub mod settings;
 mod urdf;
+mod visible;
 mod warnings;
 
 pub use capsule::{SegmentPair, closest_points};
 pub use data::RobotData;
 pub use error::RobotError;
 pub use robot::{ContactPoint, Joint, Leg, LinkPoint, Robot};
+pub use visible::{Form, Visible};

@@ -1,14 +1,15 @@
 //! A robot as a URDF: its tree, inertias, limits and the shapes that are seen, for programs that want one (Foxglove, RViz,
-//! robot_state_publisher). Capsules become a cylinder between two spheres; meshes and planes are left out.
+//! robot_state_publisher). Capsules become a cylinder between two spheres. Which shapes are seen:
+//! [`crate::Visible`].
 //!
 //! Names are the model's, so that link frames in a recording find their shapes.
 
 use std::fmt::Write;
 
-use mujoco_rs::prelude::MjtGeomBase;
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
 use crate::Robot;
+use crate::visible::{Form, Visible};
 
 impl Robot {
     /// The robot as a URDF; its root is the base link.
@@ -36,8 +37,8 @@ impl Robot {
                 inertia[(0, 2)],
                 inertia[(1, 2)],
             );
-            for geom in (0..model.geom_bodyid().len()).filter(|&geom| index(model.geom_bodyid()[geom]) == link) {
-                self.visual(geom, &mut text);
+            for part in self.visible().filter(|part| part.link == link) {
+                visual(&part, &mut text);
             }
             text.push_str("  </link>\n");
             if link == self.base {
@@ -70,38 +71,33 @@ impl Robot {
         text.push_str("</robot>\n");
         text
     }
+}
 
-    fn visual(&self, geom: usize, text: &mut String) {
-        let model = self.model();
-        let [r, g, b, a] = model.geom_rgba()[geom];
-        if model.geom_group()[geom] >= 3 || a <= 0.0 {
-            return;
+fn visual(part: &Visible, text: &mut String) {
+    let [r, g, b, a] = part.color;
+    let (at, turn) = (part.position, part.rotation.to_rotation_matrix().into_inner());
+    let mut show = |at: Vector3<f64>, shape: String| {
+        let _ = writeln!(
+            text,
+            "    <visual>{}<geometry>{shape}</geometry><material name=\"geom_{}\"><color rgba=\"{r} {g} {b} {a}\"/></material></visual>",
+            origin(&at, &turn),
+            part.geom
+        );
+    };
+    let sphere = |radius: f64| format!("<sphere radius=\"{radius}\"/>");
+    let cylinder = |radius: f64, half: f64| format!("<cylinder radius=\"{radius}\" length=\"{}\"/>", 2.0 * half);
+    match part.form {
+        Form::Sphere(radius) => show(at, sphere(radius)),
+        Form::Capsule(radius, half) => {
+            let end = turn.column(2) * half;
+            show(at, cylinder(radius, half));
+            show(at - end, sphere(radius));
+            show(at + end, sphere(radius));
         }
-        let (at, turn) = (Vector3::from(model.geom_pos()[geom]), rotation(model.geom_quat()[geom]));
-        let [x, y, z] = model.geom_size()[geom];
-        let mut show = |at: Vector3<f64>, shape: String| {
-            let _ = writeln!(
-                text,
-                "    <visual>{}<geometry>{shape}</geometry><material name=\"geom_{geom}\"><color rgba=\"{r} {g} {b} {a}\"/></material></visual>",
-                origin(&at, &turn)
-            );
-        };
-        let sphere = |radius: f64| format!("<sphere radius=\"{radius}\"/>");
-        let cylinder = |radius: f64, half: f64| format!("<cylinder radius=\"{radius}\" length=\"{}\"/>", 2.0 * half);
-        match model.geom_type()[geom] {
-            MjtGeomBase::mjGEOM_SPHERE => show(at, sphere(x)),
-            MjtGeomBase::mjGEOM_CAPSULE => {
-                let end = turn.column(2) * y;
-                show(at, cylinder(x, y));
-                show(at - end, sphere(x));
-                show(at + end, sphere(x));
-            }
-            MjtGeomBase::mjGEOM_CYLINDER => show(at, cylinder(x, y)),
-            MjtGeomBase::mjGEOM_BOX => show(at, format!("<box size=\"{} {} {}\"/>", 2.0 * x, 2.0 * y, 2.0 * z)),
-            // A URDF knows no ellipsoid.
-            MjtGeomBase::mjGEOM_ELLIPSOID => show(at, sphere((x * y * z).cbrt())),
-            _ => {}
-        }
+        Form::Cylinder(radius, half) => show(at, cylinder(radius, half)),
+        Form::Box([x, y, z]) => show(at, format!("<box size=\"{} {} {}\"/>", 2.0 * x, 2.0 * y, 2.0 * z)),
+        // A URDF knows no ellipsoid.
+        Form::Ellipsoid([x, y, z]) => show(at, sphere((x * y * z).cbrt())),
     }
 }
 

@@ -32,4 +32,4 @@ mod world;
 
 pub use error::SimError;
 pub use rate::{NamedRate, Rate};
-pub use world::{BallState, Entrant, Form, Part, Steps, View, World};
+pub use world::{BallState, Entrant, Steps, View, World};

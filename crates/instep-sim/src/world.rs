@@ -25,7 +25,7 @@ use crate::model::{BALL, FLOOR, MOST_ROBOTS, build};
 use crate::sensors::orientation;
 use crate::settings::WorldSettings;
 use body::Body;
-pub use view::{Form, Part, View};
+pub use view::View;
 
 /// How deep the ball may be in something at the start, m: what its own weight presses it in, and a little more.
 const OVERLAP: f64 = 1e-3;

@@ -1,12 +1,11 @@
 //! Bodies for the replay: a robot from its model's geoms, a human from landmarks, a ball.
 //!
-//! Meshes are shown as their bounding boxes; geoms of MuJoCo's hidden groups (3 and up) and planes are left out.
+//! Which geoms are seen: `instep_robot::Robot::visible`.
 
 use instep_motion::landmark::Landmark;
 use instep_motion::phase::Side;
 use instep_report::{Actor, Color, Finish, Part, Pose, Shape};
-use instep_robot::{Robot, RobotData};
-use mujoco_rs::prelude::MjtGeomBase;
+use instep_robot::{Form, Robot, RobotData, Visible};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 /// Single precision is what the page draws with.
@@ -18,54 +17,36 @@ fn pose(position: &Vector3<f64>, rotation: &UnitQuaternion<f64>) -> Pose {
     Pose { position: to_f32(position), rotation: [rotation.w, rotation.i, rotation.j, rotation.k].map(|x| x as f32) }
 }
 
-fn rotation([w, x, y, z]: [f64; 4]) -> UnitQuaternion<f64> {
-    UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z))
+fn shape(form: Form) -> Shape {
+    let single = |half: [f64; 3]| half.map(|x| x as f32);
+    match form {
+        Form::Sphere(radius) => Shape::Sphere { radius: radius as f32 },
+        Form::Capsule(radius, half) => Shape::Capsule { radius: radius as f32, half_length: half as f32 },
+        Form::Cylinder(radius, half) => Shape::Cylinder { radius: radius as f32, half_length: half as f32 },
+        Form::Box(half) => Shape::Box { half_extents: single(half) },
+        Form::Ellipsoid(half) => Shape::Ellipsoid { radii: single(half) },
+    }
 }
 
-/// One geom of a robot.
-#[derive(Debug, Clone)]
-struct Solid {
-    shape: Shape,
-    color: Color,
-    link: usize,
-    position: Vector3<f64>,
-    rotation: UnitQuaternion<f64>,
+fn color(rgba: [f32; 4]) -> Color {
+    let [r, g, b, a] = rgba.map(|x| (x.clamp(0.0, 1.0) * 255.0).round() as u8);
+    Color { r, g, b, a }
+}
+
+fn rotation([w, x, y, z]: [f64; 4]) -> UnitQuaternion<f64> {
+    UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z))
 }
 
 /// A robot's visible geoms.
 #[derive(Debug, Clone)]
 pub(crate) struct Figure {
-    solids: Vec<Solid>,
+    solids: Vec<Visible>,
 }
 
 impl Figure {
     /// What can be seen of `robot`.
     pub(crate) fn new(robot: &Robot) -> Self {
-        let model = robot.model();
-        let visible = (0..model.geom_type().len()).filter(|&geom| {
-            model.geom_group()[geom] < 3 && model.geom_rgba()[geom][3] > 0.0 && model.geom_bodyid()[geom] > 0
-        });
-        let solids = visible.filter_map(|geom| {
-            let [a, b, c] = model.geom_size()[geom].map(|x| x as f32);
-            let (mut position, turn) = (Vector3::from(model.geom_pos()[geom]), rotation(model.geom_quat()[geom]));
-            let shape = match model.geom_type()[geom] {
-                MjtGeomBase::mjGEOM_SPHERE => Shape::Sphere { radius: a },
-                MjtGeomBase::mjGEOM_CAPSULE => Shape::Capsule { radius: a, half_length: b },
-                MjtGeomBase::mjGEOM_CYLINDER => Shape::Cylinder { radius: a, half_length: b },
-                MjtGeomBase::mjGEOM_BOX => Shape::Box { half_extents: [a, b, c] },
-                MjtGeomBase::mjGEOM_ELLIPSOID => Shape::Ellipsoid { radii: [a, b, c] },
-                MjtGeomBase::mjGEOM_MESH => {
-                    let [x, y, z, half @ ..] = model.geom_aabb()[geom];
-                    position += turn * Vector3::new(x, y, z);
-                    Shape::Box { half_extents: half.map(|x| x as f32) }
-                }
-                _ => return None,
-            };
-            let [r, g, b, a] = model.geom_rgba()[geom].map(|x| (x.clamp(0.0, 1.0) * 255.0).round() as u8);
-            let link = usize::try_from(model.geom_bodyid()[geom]).ok()?;
-            Some(Solid { shape, color: Color { r, g, b, a }, link, position, rotation: turn })
-        });
-        Self { solids: solids.collect() }
+        Self { solids: robot.visible().collect() }
     }
 
     /// The robot moving through the positions `frames` (each 7 + n); `tint` may change the colours.
@@ -79,7 +60,12 @@ impl Figure {
         let mut parts: Vec<Part> = self
             .solids
             .iter()
-            .map(|s| Part { shape: s.shape, color: tint(s.color), finish: Finish::Plain, poses: Vec::new() })
+            .map(|s| Part {
+                shape: shape(s.form),
+                color: tint(color(s.color)),
+                finish: Finish::Plain,
+                poses: Vec::new(),
+            })
             .collect();
         for q in frames {
             data.set_position(q);

@@ -15,10 +15,10 @@ use instep_perception::scene::staged::{Ball, Player, colour, staged};
 use instep_perception::scene::{Look, Paint, Scene, Shape};
 use instep_perception::{Camera as Picture, CameraPose, Team};
 use instep_player::{BallSight, RobotSight, Sights};
-use instep_robot::RobotData;
 use instep_robot::control::Sensors;
 use instep_robot::senses::Camera;
-use instep_sim::{Form, World};
+use instep_robot::{Form, RobotData};
+use instep_sim::World;
 use nalgebra::{Isometry3, Matrix3, Quaternion, UnitQuaternion, Vector3};
 
 use crate::MatchError;
@@ -106,14 +106,16 @@ impl Lens {
                 let team = team(view.team());
                 let base = view.robot().base;
                 let hidden = (other == index).then_some(self.camera.at.link);
-                let parts = view.parts().filter(|part| Some(part.link) != hidden);
+                let parts = view.robot().visible().filter(|part| Some(part.link) != hidden);
                 let parts = parts.map(|part| {
                     // A jersey round the trunk; the rest is grey as its colour is light.
-                    let [r, g, b] = part.color;
+                    let [r, g, b, _] = part.color;
                     let grey = (0.3 * r + 0.6 * g + 0.1 * b).powf(2.2);
                     let paint = if part.link == base { colour(team) } else { Paint::Plain([grey; 3]) };
-                    let turn = part.pose.rotation.to_rotation_matrix().into_inner().cast::<f32>();
-                    (shape(part.form), part.pose.translation.vector.cast::<f32>(), turn, paint)
+                    let (origin, turn) = view.link_pose(part.link);
+                    let position = (origin + turn * part.position).cast::<f32>();
+                    let turn = turn * part.rotation.to_rotation_matrix().into_inner();
+                    (shape(part.form), position, turn.cast::<f32>(), paint)
                 });
                 Player { team: Some(team), parts: parts.collect() }
             })
@@ -232,6 +234,75 @@ fn shape(form: Form) -> Shape {
         Form::Sphere(radius) => Shape::Sphere(radius as f32),
         Form::Capsule(radius, half) => Shape::Capsule(radius as f32, half as f32),
         Form::Cylinder(radius, half) => Shape::Cylinder(radius as f32, half as f32),
-        Form::Box(half) => Shape::Box(half.map(|side| side as f32)),
+        // The renderer knows no ellipsoid.
+        Form::Box(half) | Form::Ellipsoid(half) => Shape::Box(half.map(|side| side as f32)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+    use std::sync::Arc;
+
+    use instep_field::{Field, Pose};
+    use instep_robot::Robot;
+    use instep_sim::sensors::SensorSuite;
+    use instep_sim::settings::WorldSettings;
+    use instep_sim::{BallState, Entrant};
+
+    use super::*;
+
+    /// A robot that stands turned on the field and has turned its head by `yaw` sees a ball, an opponent and landmarks; all in its
+    /// own frame, and where the camera looks.
+    #[test]
+    fn what_is_seen_lies_where_it_is_wherever_robot_and_head_look() {
+        let robot = Arc::new(Robot::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots/artemis")).unwrap());
+        let field = Arc::new(Field::named("adult-2024").unwrap());
+        let start = Pose::new(-1.5, 1.0, 0.2);
+        // It has turned since the inertial sensor began to count.
+        let own = Pose { heading: start.heading - 0.8, ..start };
+        let other = Pose::new(1.4, -0.3, 2.0);
+        let entrants = [(Side::Home, start), (Side::Away, other)];
+        let entrants = entrants.map(|(team, pose)| Entrant { robot: Arc::clone(&robot), team, pose });
+        let neck = robot.joint_index("neck_yaw").unwrap();
+        for yaw in [0.0, 0.4, -0.4] {
+            let mut world = World::on_field(Arc::clone(&field), &entrants, &WorldSettings::default()).unwrap();
+            let mut q = world.on(0).q().to_vec();
+            let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), own.heading - start.heading);
+            let turned = turn * UnitQuaternion::from_quaternion(Quaternion::new(q[3], q[4], q[5], q[6]));
+            q[3..7].copy_from_slice(&[turned.w, turned.i, turned.j, turned.k]);
+            q[7 + neck] = yaw;
+            world.place_robot(0, &q, &vec![0.0; robot.nv()]).unwrap();
+            let [x, y] = own.outer_from_local([1.9, 0.3]);
+            world.place_ball(&BallState::at_rest([x, y, field.ball.radius]));
+            let mut suite = SensorSuite::of(&mut world, 0, 1);
+            let mut body = Sensors::default();
+            suite.sense(&world);
+            suite.read_into(0.0, &mut body);
+            let mut lens = Lens::new(&world, 0, robot.camera.unwrap(), 7).unwrap();
+            lens.take(&world, 0, &body);
+            lens.develop();
+            let late = robot.camera.unwrap().latency[1];
+            assert!(lens.arrived(late - 0.002).is_none(), "before the camera is done");
+            let sights = lens.arrived(late).unwrap();
+            assert!(lens.arrived(late).is_none(), "handed out once");
+            assert_eq!(sights.time, 0.0);
+            assert!((sights.gaze_yaw - yaw).abs() < 0.03, "{} for {yaw}", sights.gaze_yaw);
+            let off = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
+            let ball = sights.ball.unwrap();
+            assert!(off(ball.position, [1.9, 0.3]) < 0.05, "{yaw}: {ball:?}");
+            assert!((ball.height - field.ball.radius).abs() < 0.05, "{yaw}: {ball:?}");
+            let there = own.local_from_outer(other.position());
+            let seen = sights.robots.iter().find(|robot| off(robot.position, there) < 0.4);
+            assert!(seen.is_some_and(|robot| robot.mate == Some(false)), "{yaw}: {:?}", sights.robots);
+            assert!(!sights.landmarks.is_empty(), "{yaw}");
+            for sight in &sights.landmarks {
+                let at = own.outer_from_local(sight.position);
+                // A far post's foot is told to a pixel.
+                let within = 0.3 + 0.05 * off(sight.position, [0.0; 2]);
+                let near = field.landmarks().iter().any(|l| l.class == sight.class && off([l.x, l.y], at) < within);
+                assert!(near, "{yaw}: {sight:?} at {at:?}");
+            }
+        }
     }
 }

@@ -6,7 +6,6 @@ use instep_field::Side;
 use instep_robot::Robot;
 use instep_robot::senses::Camera;
 use mujoco_rs::mujoco_c;
-use mujoco_rs::prelude::MjtGeomBase;
 use nalgebra::{Isometry3, Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 use super::body::Body;
@@ -16,32 +15,6 @@ use crate::trial::FALLEN_TILT;
 
 /// Height of the base link, as a share of its standing height, below which the robot counts as fallen.
 const FALLEN_HEIGHT: f64 = 0.5;
-
-/// A solid part of a robot, as a renderer draws it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Part {
-    /// The link that it belongs to.
-    pub link: usize,
-    /// Its form.
-    pub form: Form,
-    /// `world_from_part`.
-    pub pose: Isometry3<f64>,
-    /// Red, green, blue as in the model file, 0 to 1.
-    pub color: [f32; 3],
-}
-
-/// A part's form about its middle, m.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Form {
-    /// Radius.
-    Sphere(f64),
-    /// Radius, and half the length between the ends' centres, along z.
-    Capsule(f64, f64),
-    /// Radius and half length, along z.
-    Cylinder(f64, f64),
-    /// Half sides along x, y, z; of a mesh or an ellipsoid those of the box around it.
-    Box([f64; 3]),
-}
 
 /// One robot of a world. Positions and speeds are in the world's frame, m, rad, s.
 #[derive(Clone, Copy)]
@@ -167,7 +140,8 @@ impl<'a> View<'a> {
     }
 
     /// Origin of a link (m) and `world_from_link`, as of the start of the last step.
-    pub(crate) fn link_pose(&self, link: usize) -> (Vector3<f64>, Matrix3<f64>) {
+    #[must_use]
+    pub fn link_pose(&self, link: usize) -> (Vector3<f64>, Matrix3<f64>) {
         let (data, body) = (&self.world.data, link + self.body.links);
         (data.xpos()[body].into(), Matrix3::from_row_slice(&data.xmat()[body]))
     }
@@ -178,36 +152,6 @@ impl<'a> View<'a> {
         let (origin, rotation) = self.link_pose(camera.at.link);
         let turn = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation));
         Isometry3::from_parts((origin + rotation * camera.at.point).into(), turn * camera.link_from_camera)
-    }
-
-    /// Its parts as they are, as of the start of the last step.
-    pub fn parts(self) -> impl Iterator<Item = Part> + use<'a> {
-        let data = &self.world.data;
-        let (model, links) = (data.model(), self.body.links);
-        let own = move |role: &super::GeomRole| {
-            role.robot.is_some_and(|robot| std::ptr::eq(self.body, &raw const self.world.bodies[robot]))
-        };
-        self.world.geoms.iter().enumerate().filter(move |(_, role)| own(role)).map(move |(geom, _)| {
-            let [a, b, _] = model.geom_size()[geom];
-            let [_, _, _, x, y, z] = model.geom_aabb()[geom];
-            let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_row_slice(&data.geom_xmat()[geom]));
-            let form = match model.geom_type()[geom] {
-                MjtGeomBase::mjGEOM_SPHERE => Form::Sphere(a),
-                MjtGeomBase::mjGEOM_CAPSULE => Form::Capsule(a, b),
-                MjtGeomBase::mjGEOM_CYLINDER => Form::Cylinder(a, b),
-                _ => Form::Box([x, y, z]),
-            };
-            let [red, green, blue, _] = model.geom_rgba()[geom];
-            Part {
-                link: usize::try_from(model.geom_bodyid()[geom]).unwrap_or(0).saturating_sub(links),
-                form,
-                pose: Isometry3::from_parts(
-                    Vector3::from(data.geom_xpos()[geom]).into(),
-                    UnitQuaternion::from_rotation_matrix(&rotation),
-                ),
-                color: [red, green, blue],
-            }
-        })
     }
 
     /// `world_from_heading`: the base link's ground projection and its heading.
