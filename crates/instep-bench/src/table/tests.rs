@@ -119,3 +119,16 @@ fn a_rate_is_shown_in_per_cent_with_its_interval() {
     assert_eq!(head.len(), body[0].len());
     assert_eq!(body[0][9..], ["1.50 (0.75)", "3.0/3.0", "1.50", "1.50", "1000.0/1000.0", "1000000/10000000", "0", "2"]);
 }
+
+#[test]
+fn what_a_robot_allows_is_counted_apart_from_what_an_engine_delivers() {
+    let delivered = Kicked { delivered: true, ..kicked(1.0, 1.0, 0.0) };
+    let outcomes = vec![Ok(delivered), Ok(kicked(1.0, 1.0, 0.0)), Err("too_far".into()), Err("too_fast".into())];
+    // The third is just below 0.8 of what was asked, the fourth is out of reach.
+    let bounds = vec![Some(2.0), Some(0.8), Some(0.79), None];
+    let cell = CellResult { bounds, asked: vec![1.0; 4], ..cell("match", 1, outcomes) };
+    let row = &rows(&[cell])[0];
+    let share = |rate: &NamedRate| rate.rate.unwrap().share;
+    assert_eq!((share(&row.allowed), share(&row.delivered_of_allowed)), (0.5, 0.5));
+    assert_eq!(row.bound_ball_speed_median, Some(0.8));
+}

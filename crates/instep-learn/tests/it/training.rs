@@ -229,3 +229,23 @@ fn settings_come_back_from_toml_and_wrong_ones_are_named() {
     assert!(wrong("[world]\nstep = 0.003").contains("world.step"));
     assert!(toml::from_str::<LearnSettings>("[ppo]\ngama = 0.9").is_err());
 }
+
+#[test]
+fn the_ball_is_learnt_in_worlds_as_built_that_differ_and_the_reference_in_ideal_ones() {
+    use instep_sim::settings::Fidelity;
+    use rand::SeedableRng as _;
+    let (robot, reference) = prestoe();
+    let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(4);
+    let scene = |settings| Scene::new(Arc::clone(&robot), Arc::clone(&reference), settings).unwrap();
+    let ball = scene(LearnSettings::ball());
+    let [one, other] = [(); 2].map(|()| *ball.world(&mut rng).unwrap().settings());
+    for world in [&one, &other] {
+        assert_eq!((world.drives, world.senses), (Fidelity::AsBuilt, Fidelity::AsBuilt));
+        assert_eq!((world.step.tick, world.step.far), (0.001, 0.001));
+    }
+    assert_ne!(one.model_error.mass, other.model_error.mass);
+    assert_ne!(one.pitch.friction, other.pitch.friction);
+    let track = scene(LearnSettings::default());
+    let world = *track.world(&mut rng).unwrap().settings();
+    assert_eq!((world.drives, world.senses, world.model_error.mass), (Fidelity::Ideal, Fidelity::Ideal, 1.0));
+}

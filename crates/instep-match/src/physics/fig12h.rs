@@ -334,7 +334,39 @@ impl Watch {
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
     use super::*;
+
+    #[test]
+    fn a_touch_is_told_with_its_time_and_its_opponent() {
+        let robot = Arc::new(Robot::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots/artemis")).unwrap());
+        let field = Arc::new(Field::named("adult-2024").unwrap());
+        let entrant = |team, x| (Entrant { robot: Arc::clone(&robot), team, pose: Pose::new(x, 0.0, 0.0) }, None);
+        let mut others = vec![entrant(Side::Away, 2.0), entrant(Side::Away, 4.0)];
+        let kicks = instep_behaviour::KickTable { kick: Vec::new() };
+        let settings = PlayerSettings::load(&robot, instep_behaviour::Strategy::default(), &kicks).unwrap();
+        let (start, sight) = (Start::Anywhere, Sight::Simulated);
+        let guest = Guest { team: Side::Home, number: 2, start, settings, sight, seed: 1 };
+        others.insert(0, (entrant(Side::Home, -2.0).0, Some(guest)));
+        let mut arena = Arena::new(&field, others, &SightSettings::default()).unwrap();
+        let mut watch = Watch::default();
+        let run = |arena: &mut Arena, watch: &mut Watch| {
+            for _ in 0..20 {
+                arena.advance().unwrap();
+                watch.look(arena, &field);
+            }
+        };
+        run(&mut arena, &mut watch);
+        assert_eq!(watch.touch, None);
+        // The second opponent is put into its arms.
+        arena.carry(2, Pose::new(-1.85, 0.0, 0.0)).unwrap();
+        let before = arena.time();
+        run(&mut arena, &mut watch);
+        let touch = watch.touch.unwrap();
+        assert!(touch.opponent == 1 && (before..before + 0.03).contains(&touch.time), "{touch:?}");
+        assert!((touch.pose.x + 2.0).abs() < 0.1, "{touch:?}");
+    }
 
     #[test]
     fn every_setup_has_its_ball_in_view_and_room_around_everybody() {

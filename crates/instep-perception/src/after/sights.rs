@@ -107,3 +107,35 @@ pub fn sights(
     sights.landmarks = select::best(&landmarks);
     sights
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::label::Rect;
+
+    #[test]
+    fn an_intersection_is_of_one_class_in_one_place_and_none_is_farther_than_was_taught() {
+        let camera = Camera::default();
+        let pose = CameraPose::looking([0.0, 0.0, 1.2], 0.0, 0.3, 0.0);
+        let frame = Frame::new(camera.width, camera.height);
+        let map =
+            Depth { width: camera.width, height: camera.height, meters: vec![f32::NAN; camera.width * camera.height] };
+        let at = |x: f32, y: f32| camera.project(pose.camera_from_world(nalgebra::Vector3::new(x, y, 0.0))).unwrap();
+        let found = |class, confidence, [u, v]: [f32; 2]| Detection {
+            class,
+            rect: Rect::around([u, v], 20.0, 12.0),
+            confidence,
+            team: None,
+        };
+        let all = [
+            found(Class::T, 0.9, at(3.0, 0.0)),
+            found(Class::X, 0.8, at(3.2, 0.1)),
+            found(Class::L, 0.7, at(3.0, 1.0)),
+            found(Class::L, 0.7, at(LANDMARK_RANGE + 0.3, 0.0)),
+        ];
+        let seen = sights(&camera, &pose, 0.11, &frame, &map, &all);
+        let mut classes: Vec<Class> = seen.landmarks.iter().map(|sight| sight.class).collect();
+        classes.sort();
+        assert_eq!(classes, [Class::L, Class::T], "{:?}", seen.landmarks);
+    }
+}

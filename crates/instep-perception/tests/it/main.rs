@@ -105,5 +105,8 @@ fn the_shipped_detector_finds_what_is_there() {
         })
         .collect();
     let of = |class| metric::row(&judged, class, 0.5).map50;
-    assert!(of(Class::Ball) > 0.5 && of(Class::Robot) > 0.5, "{} {}", of(Class::Ball), of(Class::Robot));
+    // Its card says 0.86 to 0.96, over more frames.
+    for class in Class::ALL {
+        assert!(of(class) > 0.75, "{class:?}: {}", of(class));
+    }
 }

@@ -7,7 +7,7 @@ use instep_player::legs::Stage;
 use instep_player::{BallSight, Fix, HeardBall, Message, Output, Player, RobotSight, Senses, Sights};
 use proptest::prelude::*;
 
-use crate::support::{player, robot, standing};
+use crate::support::{artemis, player, player_of, robot, standing, standing_of};
 
 fn is_finite(output: &Output) -> bool {
     let command = &output.command;
@@ -52,6 +52,28 @@ fn a_ball_that_is_seen_is_walked_to_and_stays_where_it_lies_on_the_field() {
     assert!((ball.position[0] - wanted[0]).hypot(ball.position[1] - wanted[1]) < 0.3, "{ball:?}");
     assert_eq!(player.decision().unwrap().action, Action::Approach);
     assert!(player.record().velocity[0] > 0.1, "{:?}", player.record());
+}
+
+#[test]
+fn a_kick_begins_on_its_line_and_not_into_somebody_beside_the_ball() {
+    let begins = |others: &[[f64; 2]]| {
+        let robot = artemis();
+        let mut player = player_of(artemis(), Pose::new(1.0, 0.0, 0.0));
+        let robots =
+            others.iter().map(|&position| RobotSight { position, mate: Some(false), number: None, fallen: false });
+        let ball = Some(BallSight { position: [1.5, 0.0], height: 0.11, std: 0.02 });
+        let sights = Sights { ball, robots: robots.collect(), ..Sights::default() };
+        (0..100).any(|i| {
+            let time = 0.01 * f64::from(i);
+            let sights = Some(Sights { time, ..sights.clone() });
+            player.tick(&Senses { sights, ..standing_of(&robot, time) });
+            player.legs().stage() == Stage::RunUp
+        })
+    };
+    assert!(begins(&[]));
+    // Far enough beside the ball's way to the goal, but not beside the body's: another line is wanted, to which it walks first.
+    assert!(!begins(&[[2.05, 0.45]]));
+    assert!(begins(&[[2.05, 1.2]]), "farther off nobody is in the way");
 }
 
 #[test]

@@ -67,6 +67,7 @@ fn a_policy_is_trained_resumed_measured_and_kicks() {
         "upright_rate",
         "audit_invalid",
         "limit_violations",
+        "torque_reversal_share",
     ] {
         assert!(measures.get(key).is_some(), "{key}");
     }
@@ -76,6 +77,18 @@ fn a_policy_is_trained_resumed_measured_and_kicks() {
     assert_eq!(kick["policy"].as_str(), Some("out/train/policy.safetensors"));
     assert_eq!(kick["reference_start"].as_f64(), Some(0.9));
     assert!(at.join("out/kick/report.html").exists());
+
+    // Settings that say nothing of clip and network leave them as the policy has them.
+    std::fs::write(
+        at.join("more.toml"),
+        SMALL[SMALL.find("[start]").unwrap()..SMALL.find("[network]").unwrap()].as_bytes(),
+    )
+    .unwrap();
+    let from =
+        ["--from", "out/train/policy.safetensors", "--settings", "more.toml", "--budget", "256", "--out", "out/more"];
+    object(&instep(at, &[&["train", "--json"], &from[..]].concat()));
+    let kick = object(&instep(at, &["kick", "--policy", "out/more/policy.safetensors", "--json"]));
+    assert_eq!(kick["reference_start"].as_f64(), Some(0.9));
 }
 
 #[test]
@@ -142,4 +155,17 @@ fn the_table_compares_three_references_with_and_without_early_termination() {
     // The trainings are kept and are longer than what is asked for now.
     let before = listing(at);
     assert_refused(&table("256"), &["512 control steps", "--budget 256", "--out"], at, &before);
+}
+
+/// The figures of its card, with room for what a few trials differ.
+#[test]
+fn the_shipped_policy_is_what_its_card_says() {
+    let folder = tempfile::tempdir().unwrap();
+    let asked = ["eval", "policies/prestoe/10_03.safetensors", "--trials", "6", "--seed", "3001", "--json"];
+    let measures = object(&instep(folder.path(), &asked));
+    let of = |key: &str| measures[key].as_f64().unwrap();
+    assert!((11.2..12.1).contains(&of("ball_speed_median")), "{}", of("ball_speed_median"));
+    assert!(of("direction_error_median_deg") < 6.0, "{}", of("direction_error_median_deg"));
+    assert_eq!((of("upright_rate"), of("limit_violations")), (1.0, 0.0));
+    assert!((0.008..0.03).contains(&of("torque_reversal_share")), "{}", of("torque_reversal_share"));
 }
