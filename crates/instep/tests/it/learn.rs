@@ -79,11 +79,8 @@ fn a_policy_is_trained_resumed_measured_and_kicks() {
     assert!(at.join("out/kick/report.html").exists());
 
     // Settings that say nothing of clip and network leave them as the policy has them.
-    std::fs::write(
-        at.join("more.toml"),
-        SMALL[SMALL.find("[start]").unwrap()..SMALL.find("[network]").unwrap()].as_bytes(),
-    )
-    .unwrap();
+    std::fs::write(at.join("more.toml"), &SMALL[SMALL.find("[start]").unwrap()..SMALL.find("[network]").unwrap()])
+        .unwrap();
     let from =
         ["--from", "out/train/policy.safetensors", "--settings", "more.toml", "--budget", "256", "--out", "out/more"];
     object(&instep(at, &[&["train", "--json"], &from[..]].concat()));
