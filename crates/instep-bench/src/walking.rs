@@ -1,6 +1,6 @@
 //! One walk from start to stop: runs a [`Walker`] on its senses in a world, disturbs it, measures and records.
 //!
-//! The robot starts in its stand, is asked for a velocity or a goal for `duration`, then to stop. Speeds are those of the real
+//! The robot starts in its stand, in which its senses come to rest for a second, is asked for a velocity or a goal for `duration`, then to stop. Speeds are those of the real
 //! base over the ground in its real heading, from the time when the gait has reached what was asked; nothing of the truth
 //! reaches the walker.
 
@@ -22,6 +22,8 @@ use crate::cpu::thread_seconds;
 
 /// The period of a torque-driven robot's control, s (paper 4: 1 kHz).
 pub const PERIOD: f64 = 0.001;
+/// Time before the walk in which the robot stands, s: no robot walks off in the instant of its start.
+const BEFORE: f64 = 1.0;
 /// Time after the asked walk in which the robot has to stop and to stand, s.
 pub const AFTER: f64 = 3.0;
 /// Time from the start after which the speed counts, s: shift of the weight, then acceleration.
@@ -83,6 +85,8 @@ pub struct Walked {
     pub drift_share: f64,
     /// Root mean square error of the estimated velocity over the ground, m/s.
     pub velocity_error: f64,
+    /// How far the estimated heading is off at the end, rad.
+    pub heading_error: f64,
     /// From the end of what was asked until the robot has stopped for good, s.
     pub stop_time: Option<f64>,
     /// Distance (m) and angle (rad) from the goal at the end, where one was asked.
@@ -148,11 +152,11 @@ pub fn walk(
     let mut command = JointCommand::zeros(robot.joints.len());
     let mut meter = Meter::new(robot, task);
     let period = world_settings.step.tick;
-    let steps = ((task.duration + AFTER) / period).round() as usize;
+    let steps = ((BEFORE + task.duration + AFTER) / period).round() as usize;
     for step in 0..steps {
-        let time = step as f64 * period;
+        let time = step as f64 * period - BEFORE;
         let asked = match task.asked {
-            _ if time >= task.duration => Velocity::default(),
+            _ if !(0.0..task.duration).contains(&time) => Velocity::default(),
             Asked::Velocity(velocity) => velocity,
             Asked::Goal(goal) => approach::toward(walker.odometry(), goal, &limits),
         };
@@ -180,7 +184,7 @@ pub fn walk(
             tell(time);
         }
         if has_fallen(&world) {
-            meter.fell_at = Some(world.time());
+            meter.fell_at = Some(world.time() - BEFORE);
             break;
         }
     }
@@ -200,6 +204,7 @@ struct Meter {
     last: Option<([f64; 2], f64)>,
     moving: f64,
     velocity_square: f64,
+    heading_error: f64,
     samples: f64,
     footsteps: Vec<Footstep>,
     sample_period: f64,
@@ -220,6 +225,7 @@ impl Meter {
             last: None,
             moving: 0.0,
             velocity_square: 0.0,
+            heading_error: 0.0,
             samples: 0.0,
             footsteps: Vec::new(),
             sample_period: 0.005_f64.max((task.duration + AFTER) / SAMPLES),
@@ -247,7 +253,7 @@ impl Meter {
             }
         }
         self.last = Some((place, heading));
-        if time < self.task.duration {
+        if (0.0..self.task.duration).contains(&time) {
             self.asked = asked;
         }
         if speed > STOPPED || !matches!(walker.gait().view().mode, Mode::Stand) {
@@ -255,6 +261,7 @@ impl Meter {
         }
         let estimate = walker.estimate();
         let error = Vector2::new(v[0] - estimate.v[0], v[1] - estimate.v[1]);
+        self.heading_error = wrap(heading - self::heading(&estimate.q));
         self.velocity_square += error.norm_squared();
         self.samples += 1.0;
         self.footsteps.extend(walker.gait().footstep());
@@ -314,6 +321,7 @@ impl Meter {
             error,
             distance: self.way,
             drift_share: if self.way > 0.0 { drift / self.way } else { 0.0 },
+            heading_error: self.heading_error,
             velocity_error: (self.velocity_square / self.samples.max(1.0)).sqrt(),
             stop_time: (self.fell_at.is_none() && self.moving < self.task.duration + AFTER - 0.5)
                 .then_some((self.moving - self.task.duration).max(0.0)),

@@ -173,8 +173,9 @@ impl Made {
         row(
             "estimate",
             format!(
-                "off by {:.1} % of the way; velocity {:.3} m/s rms",
+                "off by {:.1} % of the way and {:.1}\u{b0}; velocity {:.3} m/s rms",
                 walked.drift_share * 100.0,
+                walked.heading_error.to_degrees(),
                 walked.velocity_error
             ),
         );
@@ -221,6 +222,8 @@ struct Measures<'a> {
     clipped: Option<String>,
     distance: f64,
     drift_share: f64,
+    /// Of the estimate at the end.
+    heading_error_deg: f64,
     velocity_error_rms: f64,
     stop_time: Option<f64>,
     goal_error: Option<f64>,
@@ -254,6 +257,7 @@ impl<'a> Measures<'a> {
             clipped: made.clipped(),
             distance: walked.distance,
             drift_share: walked.drift_share,
+            heading_error_deg: walked.heading_error.to_degrees(),
             velocity_error_rms: walked.velocity_error,
             stop_time: walked.stop_time,
             goal_error: walked.goal_error.map(|error| error[0]),

@@ -1,7 +1,7 @@
 //! The state of a walking robot from its senses: the filter of [`super::filter`] on heel and toe of each foot.
 //!
 //! Points are the middles of the foremost and the hindmost contact points of a foot; one stands while it bears its share of the
-//! weight, with hysteresis. Angles, rates and speeds of the joints are taken as read. How good the senses are follows from the robot's
+//! weight, with hysteresis. A robot that has stood on all of them for a while without turning is at rest, which tells the gyro's bias. Angles, rates and speeds of the joints are taken as read. How good the senses are follows from the robot's
 //! `[senses]`: noise as stated there, with floors, since no sensor is perfect.
 
 use std::sync::Arc;
@@ -19,13 +19,17 @@ use crate::whole_body::{FootModel, ground_point};
 /// Share of the weight from which a foot stands, and below which it has left the ground; half of that for heel and toe.
 const LOAD: [f64; 2] = [0.07, 0.035];
 /// How a standing point creeps, m/s/sqrt(Hz): yaw leans on it, so it is what soft ground does; real slips are thrown out.
-const SLIP: f64 = 0.005;
+const SLIP: f64 = 0.001;
 /// Least noise of gyro (rad/s), accelerometer (m/s^2) and kinematics (m): soft ground, bending legs.
 const LEAST: [f64; 3] = [0.002, 0.02, 0.001];
 /// Deviation of the first orientation, rad, and least ones of the biases of gyro (rad/s) and accelerometer (m/s^2).
 const START: [f64; 3] = [0.01, 0.002, 0.02];
 /// How far the biases wander, as a share of their deviation in the square root of a second.
 const WANDER: f64 = 0.02;
+
+/// How long a robot must not have turned to be at rest, s; how fast it may seem to turn by a gyro of known bias, rad/s; lag of what it
+/// seems, s; and how a standing body sways after all, rad/s/sqrt(Hz).
+const REST: [f64; 4] = [0.2, 0.02, 0.1, 0.0002];
 
 /// The estimator.
 #[derive(Debug)]
@@ -38,6 +42,9 @@ pub struct Estimator {
     bears: [bool; CONTACTS],
     filter: Option<ContactEkf>,
     last: f64,
+    /// The gyro's reading without its noise, rad/s, and since when it tells of no turn, s.
+    turning: Vector3<f64>,
+    still: f64,
 }
 
 impl Estimator {
@@ -53,7 +60,17 @@ impl Estimator {
             let is_toe = |c: usize| (ground_point(&robot, &data, c) - middle).dot(&ahead) > 0.0;
             foot.contacts.iter().copied().filter(|&c| is_toe(c) == (i % 2 == 1)).collect()
         });
-        Self { data, feet, points, bears: [true; CONTACTS], filter: None, last: 0.0, robot }
+        Self {
+            data,
+            feet,
+            points,
+            bears: [true; CONTACTS],
+            filter: None,
+            last: 0.0,
+            turning: Vector3::zeros(),
+            still: 0.0,
+            robot,
+        }
     }
 
     /// The filter, once there was a reading.
@@ -99,6 +116,15 @@ impl Estimator {
             filter.propagate(&rate, &sensors.accelerometer.into(), period);
         }
         filter.correct(&contacts);
+        if period > 0.0 {
+            let [least, slow, lag, sway] = REST;
+            self.turning += (rate - self.turning) * (1.0 - (-period / lag).exp());
+            let quiet = (self.turning - filter.gyro_bias).amax() < slow + 2.0 * robot.senses.gyro_bias;
+            self.still = if quiet && self.bears.iter().all(|&bears| bears) { self.still + period } else { 0.0 };
+            if self.still > least {
+                filter.rest(&rate, sway, period);
+            }
+        }
 
         let rate = rate - filter.gyro_bias;
         let lever = filter.rotation * robot.imu.point;

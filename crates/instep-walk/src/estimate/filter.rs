@@ -171,6 +171,18 @@ impl ContactEkf {
         }
     }
 
+    /// The sensor does not turn about the vertical: what the gyro reads of that (rad/s) over `period` (s) is its bias, its noise, and a sway of
+    /// the density `sway` (rad/s/sqrt(Hz)). Gravity shows the other two axes; feet that creep never show this one.
+    pub fn rest(&mut self, gyro: &Vector3<f64>, sway: f64, period: f64) {
+        let vertical: Vector3<f64> = self.rotation.row(2).transpose();
+        let base: SVector<f64, ERROR> = self.covariance.fixed_columns::<3>(GYRO_BIAS) * vertical;
+        let noise = (self.noise.gyro.powi(2) + sway * sway) / period;
+        let gain = base / (vertical.dot(&base.fixed_rows::<3>(GYRO_BIAS)) + noise);
+        self.covariance -= gain * base.transpose();
+        self.covariance = (self.covariance + self.covariance.transpose()) * 0.5;
+        self.retract(&(gain * vertical.dot(&(gyro - self.gyro_bias))));
+    }
+
     /// Takes what the legs say of every contact point: those that stood and stand correct the state, new ones enter it, those
     /// that left the ground leave it. A point whose place cannot be that of a standing one has slipped: it stands anew where it is.
     pub fn correct(&mut self, contacts: &[Contact; CONTACTS]) {

@@ -237,6 +237,26 @@ fn finds_the_biases_of_a_robot_that_stands() {
 }
 
 #[test]
+fn a_rest_finds_the_bias_about_the_vertical_and_tells_how_well() {
+    let gyro_bias = Vector3::new(0.003, -0.004, 0.006);
+    let mut rng = ChaCha8Rng::seed_from_u64(4);
+    let mut squares = 0.0;
+    for _ in 0..40 {
+        let mut filter = ContactEkf::new(NOISE, Matrix3::identity(), Vector3::zeros(), Vector3::z(), SPREAD);
+        for _ in 0..500 {
+            let gyro = gyro_bias + normals(&mut rng, NOISE.gyro / PERIOD.sqrt());
+            filter.propagate(&gyro, &Vector3::new(0.0, 0.0, crate::settings::GRAVITY), PERIOD);
+            filter.rest(&gyro, 0.0, PERIOD);
+        }
+        let spread = filter.covariance()[(GYRO_BIAS + 2, GYRO_BIAS + 2)].sqrt();
+        squares += ((filter.gyro_bias.z - gyro_bias.z) / spread).powi(2);
+        // A second of white noise of this density, and no more than that.
+        assert!((0.5..1.5).contains(&(spread / NOISE.gyro)), "{spread}");
+    }
+    assert!((0.6..1.5).contains(&(squares / 40.0)), "{squares}");
+}
+
+#[test]
 fn a_wrong_sign_of_the_correction_would_be_seen() {
     let mut filter = moving();
     let truth = filter.clone();
