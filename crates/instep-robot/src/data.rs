@@ -187,6 +187,15 @@ impl RobotData {
         velocity
     }
 
+    /// Angular velocity of a link in the world, rad/s, for the speed that was set.
+    pub fn link_rate(&mut self, link: usize) -> Vector3<f64> {
+        let mut jacobian = std::mem::take(&mut self.jacobian);
+        self.rotation_jacobian_into(link, &mut jacobian);
+        let rate = times_v(&jacobian, self.v());
+        self.jacobian = jacobian;
+        rate
+    }
+
     /// Centre of mass in the world, m.
     #[must_use]
     pub fn com(&self) -> Vector3<f64> {

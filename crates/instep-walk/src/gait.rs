@@ -21,13 +21,18 @@ use crate::{StateEstimate, WalkError};
 
 /// How far the capture point may be from the middle of the feet when a gait ends, and how far before a standing robot steps:
 /// share of the half length of a foot, and share of half the distance across.
-const STOP: [f64; 2] = [0.4, 0.75];
+const STOP: [f64; 2] = [0.7, 0.75];
 /// See [`STOP`].
 const BALANCE: [f64; 2] = [0.9, 0.9];
 /// Farthest apart that the feet may be ahead when a gait ends, as a share of the height of the centre of mass.
 const STAGGER: f64 = 0.27;
 /// How much faster a gait slows down than it speeds up.
-const BRAKE: f64 = 8.0;
+const BRAKE: f64 = 16.0;
+/// How much faster the last steps are.
+const HURRY: f64 = 1.35;
+/// Where a body that has stopped is led first, as a share of the way from the middle of the feet to its capture point: short of that it comes to
+/// rest sooner.
+const SETTLE: f64 = 0.65;
 /// What is left between the feet when they come closest in a walk sideways, m, beyond the nearest foothold.
 const SPARE: f64 = 0.01;
 /// How soon the rate of a step follows what is wanted of it, s.
@@ -128,6 +133,8 @@ pub struct Gait {
     /// Since the tick before, s.
     period: f64,
     heading: f64,
+    /// Heading of a standing body from the mean one of its feet, rad.
+    toe: f64,
     height: f64,
     asked: Velocity,
     velocity: Velocity,
@@ -137,7 +144,7 @@ pub struct Gait {
     lift_off: (Vector3<f64>, f64),
     /// Waypoint of the swing foot at phase 1/2, m, odometry frame, for the present step.
     waypoint: Option<Vector3<f64>>,
-    /// Where a standing body is led, from the middle of the feet, odometry's axes, m: first where it comes to rest by itself.
+    /// Where a standing body is led, from the middle of the feet, odometry's axes, m: first about where it comes to rest by itself.
     rest: Vector2<f64>,
     /// Centre of mass at the beginning of a shift from the middle of the feet, in the heading's axes, m.
     shift_from: Vector2<f64>,
@@ -194,6 +201,7 @@ impl Gait {
             last_time: 0.0,
             period: 0.0,
             heading: 0.0,
+            toe: 0.0,
             asked: Velocity::default(),
             velocity: Velocity::default(),
             trim: Velocity::default(),
@@ -323,7 +331,8 @@ impl Gait {
         if !self.started {
             self.started = true;
             self.since = state.time;
-            self.heading = yaw(&self.data, &self.robot);
+            self.heading = self.link_heading(self.robot.base);
+            self.toe = wrap(self.heading - self.feet_heading());
             self.view.heading = self.heading;
             self.height = self.view.com.z - self.ground();
             self.reference.positions.copy_from_slice(&state.q[7..]);
@@ -332,9 +341,11 @@ impl Gait {
         self.counts.ticks += 1;
         self.approach(period);
         self.change(state);
-        if matches!(self.mode, Mode::Step { .. }) {
-            self.heading += (self.velocity.turn + self.trim.turn) * period;
-        }
+        self.heading += if matches!(self.mode, Mode::Step { .. }) {
+            (self.velocity.turn + self.trim.turn) * period
+        } else {
+            wrap(self.feet_heading() + self.toe - self.heading)
+        };
         self.view.heading = self.heading;
         let lowest = self.height - HEIGHT_RATE * self.settings.gait.height * period;
         self.height = self.settings.gait.height.max(lowest);
@@ -384,6 +395,23 @@ impl Gait {
     /// What the momentum of a gait ahead at `speed` (m/s) has beyond that of the pendulum, m/s.
     fn fed(&self, speed: f64) -> Vector2<f64> {
         Vector2::new(speed * (1.0 / self.settings.gait.speed_gain - 1.0), 0.0)
+    }
+
+    fn link_heading(&self, link: usize) -> f64 {
+        let ahead = self.data.link_matrix(link).column(0).into_owned();
+        ahead.y.atan2(ahead.x)
+    }
+
+    /// Mean heading of the feet, rad.
+    fn feet_heading(&self) -> f64 {
+        let [left, right] = self.body.feet.each_ref().map(|foot| self.link_heading(foot.reference.link));
+        right + 0.5 * wrap(left - right)
+    }
+
+    /// Speed ahead of a gait whose steps are all as the present one, m/s: the leg swings twice as fast.
+    fn swung(&self) -> f64 {
+        let way = Rotation2::new(-self.heading) * (self.view.foothold - self.lift_off.0).xy();
+        0.5 * way.x / self.settings.gait.step_time
     }
 
     /// Height of the ground under the feet that carry, m.
@@ -454,7 +482,8 @@ impl Gait {
                     self.learner.touch_down();
                     if self.may_stop() {
                         self.mode = Mode::Stand;
-                        self.rest = Rotation2::new(self.heading) * self.capture();
+                        self.rest = Rotation2::new(self.heading) * self.capture() * SETTLE;
+                        self.toe = wrap(self.heading - self.feet_heading());
                         self.since = state.time;
                         self.waypoint = None;
                     } else {
@@ -497,9 +526,11 @@ impl Gait {
     /// The foot other than `support` leaves the ground.
     fn lift(&mut self, support: Side, time: f64) {
         let swing = support.other();
-        let foot = &self.body.feet[swing as usize];
-        let ahead = self.data.link_matrix(foot.reference.link).column(0).into_owned();
-        self.lift_off = (self.view.feet[swing as usize], self.heading + wrap(ahead.y.atan2(ahead.x) - self.heading));
+        // The foot swings as far again until it is known better.
+        let swung = self.view.foothold - self.lift_off.0;
+        let heading = self.link_heading(self.body.feet[swing as usize].reference.link);
+        self.lift_off = (self.view.feet[swing as usize], self.heading + wrap(heading - self.heading));
+        self.view.foothold = self.lift_off.0 + if self.counts.steps > 0 { swung } else { Vector3::zeros() };
         self.mode = Mode::Step { support };
         self.since = time;
         self.waypoint = None;
@@ -540,10 +571,14 @@ impl Gait {
             put(&mut shift.acceleration, ahead[2], across[2]);
         }
         self.view.phase = 0.0;
+        // A standing body keeps its heading to its feet, which its legs tell exactly. Held to the world, it turns as fast as its gyro
+        // is wrong: the feet creep along, and the estimate, which believes that they stand, takes that for a bias.
+        let [left, right] = [0, 1].map(|side| self.body.feet[side].reference.link);
+        let turn = 0.5 * (self.data.link_rate(left).z + self.data.link_rate(right).z);
         Targets {
             support: [true; 2],
             base: self.base(),
-            turn: 0.0,
+            turn,
             height: [middle.z + self.height, 0.0],
             shift: Some(shift),
             swing: None,
@@ -562,9 +597,11 @@ impl Gait {
         // A stop takes all momentum away at once.
         self.pendulum.alpha = if self.asked.is_zero() { 1.0 } else { gait.alpha };
         let (turn, fed, touchdown) =
-            (self.velocity.turn + self.trim.turn, self.fed(velocity.x), self.learner.offsets.touchdown);
+            (self.velocity.turn + self.trim.turn, self.fed(self.swung()), self.learner.offsets.touchdown);
         // Frames turn: the foothold is chosen in the axes that the gait will have at the touchdown.
         self.pendulum.step_time = self.learner.offsets.step_time;
+        let hurry = if self.asked.is_zero() { HURRY } else { 1.0 };
+        self.pendulum.step_time /= hurry;
         let left = self.left();
         let heading = self.heading + turn * left;
         let raw = self.pendulum_state(support, heading);
@@ -572,7 +609,7 @@ impl Gait {
         let foothold =
             |pendulum: &Pendulum, left: f64| pendulum.foothold(&state, left, velocity, turn, touchdown, swing);
         if self.waypoint.is_none() {
-            let Plan { rate, .. } = self.pendulum.time(left * self.rate, 1.0 / step_time, &reach, swing, foothold);
+            let Plan { rate, .. } = self.pendulum.time(left * self.rate, hurry / step_time, &reach, swing, foothold);
             self.rate += (rate - self.rate) * (1.0 - (-self.period / RATE_LAG).exp());
         }
         if (self.rate * step_time - 1.0).abs() > DISTURBED {
@@ -668,10 +705,4 @@ fn ease(from: f64, to: f64, phase: f64, duration: f64) -> (f64, f64) {
 
 fn wrap(angle: f64) -> f64 {
     angle.sin().atan2(angle.cos())
-}
-
-/// Heading of the base, rad.
-fn yaw(data: &RobotData, robot: &Robot) -> f64 {
-    let ahead = data.link_matrix(robot.base).column(0).into_owned();
-    ahead.y.atan2(ahead.x)
 }
