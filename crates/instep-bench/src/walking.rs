@@ -99,8 +99,8 @@ pub struct Walked {
     pub counts: Counts,
     /// Largest share of its torque limit of each joint, and of its speed limit.
     pub peaks: Vec<[f64; 2]>,
-    /// What the pendulum leaves out, as learned on the way.
-    pub offsets: Offsets,
+    /// What the pendulum leaves out, as learned on the way; of torque drives.
+    pub offsets: Option<Offsets>,
     /// Steps that were made, odometry frame.
     pub footsteps: Vec<Footstep>,
     /// Samples.
@@ -170,9 +170,9 @@ pub fn walk(
         }
         suite.read_into(world.time(), &mut sensors);
         let start = thread_seconds();
-        let targets = walker.plan(&sensors);
+        let targets = walker.plan(&sensors, &mut command);
         let planned = thread_seconds();
-        let outcome = walker.solve(&targets);
+        let outcome = walker.solve(targets.as_ref());
         let solved = thread_seconds();
         walker.write(outcome, &mut command);
         meter.solves.push(solved - planned);
@@ -256,7 +256,7 @@ impl Meter {
         if (0.0..self.task.duration).contains(&time) {
             self.asked = asked;
         }
-        if speed > STOPPED || !matches!(walker.gait().view().mode, Mode::Stand) {
+        if speed > STOPPED || !matches!(walker.view().mode, Mode::Stand) {
             self.moving = time;
         }
         let estimate = walker.estimate();
@@ -264,14 +264,14 @@ impl Meter {
         self.heading_error = wrap(heading - self::heading(&estimate.q));
         self.velocity_square += error.norm_squared();
         self.samples += 1.0;
-        self.footsteps.extend(walker.gait().footstep());
+        self.footsteps.extend(walker.footstep());
         if time + 1e-9 >= self.record.times.len() as f64 * self.sample_period {
             self.sample(time, walker, world);
         }
     }
 
     fn sample(&mut self, time: f64, walker: &Walker, world: &World) {
-        let (q, v, estimate, view) = (world.q(), world.v(), walker.estimate(), walker.gait().view());
+        let (q, v, estimate, view) = (world.q(), world.v(), walker.estimate(), walker.view());
         let record = &mut self.record;
         record.times.push(time);
         record.q.extend_from_slice(q);
@@ -328,9 +328,9 @@ impl Meter {
             goal_error,
             tick_p99: [p99(&mut self.solves), p99(&mut self.ticks)],
             real_time_factor: count as f64 * world.settings().step.tick / sum,
-            counts: walker.gait().counts(),
+            counts: walker.counts(),
             peaks: peaks.map(|(joint, peak)| [peak.torque / joint.torque, peak.speed / joint.speed]).collect(),
-            offsets: walker.gait().offsets(),
+            offsets: walker.gait().map(instep_walk::Gait::offsets),
             footsteps: self.footsteps,
             record: self.record,
         }

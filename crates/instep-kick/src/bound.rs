@@ -18,13 +18,13 @@ use crate::KickError;
 use crate::ball::BallModel;
 use crate::dynamic::DynamicSettings;
 use crate::engine::Face;
-use crate::ik::Ik;
 use crate::request::{KickRequest, Place};
 use crate::whole_body::body::Body;
 use crate::whole_body::foot::{FacePoint, contact_point, wrap};
 use crate::whole_body::forecast::{FAR, ROLL, Rehearsal, ground_gap, judge};
 use crate::whole_body::motion::goals;
 use crate::whole_body::torque::Dynamics;
+use instep_robot::ik::Ik;
 
 /// Yaws of the foot that are tried with a corner, rad.
 const YAW_STEP: f64 = 0.15;

@@ -79,3 +79,9 @@ pub enum KickError {
         expected: u64,
     },
 }
+
+impl From<instep_robot::ik::IkError> for KickError {
+    fn from(error: instep_robot::ik::IkError) -> Self {
+        Self::Setting { field: error.field, found: error.found, expected: error.expected }
+    }
+}

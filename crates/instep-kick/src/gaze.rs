@@ -14,7 +14,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 use crate::engine::{BreakOff, KickEngine, KickPlan, KickStart, Progress};
 use crate::request::{KickRequest, Refusal};
 use crate::stand::Standing;
-use crate::tree::{Tree, TreePose};
+use instep_robot::tree::{Tree, TreePose};
 
 /// How fast the neck is turned, rad/s.
 const SPEED: f64 = 2.0;

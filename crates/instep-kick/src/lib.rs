@@ -16,7 +16,6 @@
 //! - [`preview`]: paper 5's engine: preview control of the zero-moment point, a kick through a via point.
 //! - [`track`]: a window of a reference on one robot; [`playback`]: plays one open loop; [`feedforward`]: the torques that it needs.
 //! - [`policy`]: runs a network that was trained to follow a reference (paper 1), with its state estimate.
-//! - [`tree`] and [`ik`]: kinematics without MuJoCo, and inverse kinematics with weighted goals under joint limits.
 //!
 //! An engine sees sensors, never the simulator's truth, and allocates nothing in a tick.
 
@@ -30,7 +29,6 @@ pub mod engine;
 mod error;
 pub mod feedforward;
 pub mod gaze;
-pub mod ik;
 pub mod playback;
 pub mod policy;
 pub mod preview;
@@ -39,7 +37,6 @@ pub mod rolling;
 pub mod settings;
 pub mod stand;
 pub mod track;
-pub mod tree;
 pub mod whole_body;
 
 pub use ball::BallModel;

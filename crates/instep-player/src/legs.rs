@@ -173,7 +173,7 @@ impl Legs {
     /// Velocity that the gait is at, m/s, m/s, rad/s.
     #[must_use]
     pub fn velocity(&self) -> [f64; 3] {
-        let Velocity { x, y, turn } = self.walker().gait().velocity();
+        let Velocity { x, y, turn } = self.walker().velocity();
         [x, y, turn]
     }
 
@@ -242,7 +242,7 @@ impl Legs {
         self.stage = match &self.gear {
             Gear::Kick(kick) if matches!(kick.stage(), KickStage::Approach | KickStage::RunUp) => Stage::RunUp,
             Gear::Kick(kick) if matches!(kick.stage(), KickStage::Kick | KickStage::FollowThrough) => Stage::Kick,
-            _ if self.walker().gait().view().mode == Mode::Stand => Stage::Stand,
+            _ if self.walker().view().mode == Mode::Stand => Stage::Stand,
             _ => Stage::Walk,
         };
     }

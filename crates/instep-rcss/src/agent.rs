@@ -176,9 +176,10 @@ impl Agent {
         if let Some(game) = &perception.game {
             self.look_at_game(game);
         }
-        let gait = self.player.legs().walker().gait();
-        let under_way: &[f64] = match (&self.stance, self.player.legs().stage()) {
-            (Stance::Playing, Stage::Stand | Stage::Walk | Stage::RunUp | Stage::Kick) => &gait.body().acceleration,
+        let under_way = match (&self.stance, self.player.legs().stage()) {
+            (Stance::Playing, Stage::Stand | Stage::Walk | Stage::RunUp | Stage::Kick) => {
+                self.player.legs().walker().acceleration()
+            }
             _ => &[],
         };
         let cycle = self.body.take(&perception, under_way);
@@ -261,7 +262,7 @@ impl Agent {
         }
         let mut command = output.command.clone();
         if !matches!(self.player.legs().stage(), Stage::Down | Stage::Safe) {
-            body::lead(&mut command, &self.player.legs().walker().gait().body().acceleration);
+            body::lead(&mut command, self.player.legs().walker().acceleration());
         }
         self.motors(&command);
         self.beam(time);

@@ -12,6 +12,8 @@
 //! - Momentum is linear, then angular about the centre of mass, both in world axes.
 //! - Jacobians are row-major slices, 3 x (6 + n): `velocity[i] = sum_j jacobian[i * nv + j] * v[j]`.
 //!
+//! [`tree`] and [`ik`]: kinematics without MuJoCo, and inverse kinematics of both legs with weighted goals under joint limits.
+//!
 //! Nothing here simulates: the world with its ball, contacts and noise is instep-sim.
 
 pub mod adopt;
@@ -21,12 +23,14 @@ pub mod control;
 mod data;
 pub mod drive;
 mod error;
+pub mod ik;
 mod meshes;
 mod model_file;
 mod names;
 mod robot;
 pub mod senses;
 pub mod settings;
+pub mod tree;
 mod urdf;
 mod visible;
 mod warnings;

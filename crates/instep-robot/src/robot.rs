@@ -377,6 +377,21 @@ impl Robot {
         length(hip.unwrap_or(leg.thigh), leg.shank) + length(leg.shank, leg.foot) - leg.sole.point.z.min(0.0)
     }
 
+    /// Pairs of joints that the model holds equal, by name: one motor turns both.
+    #[must_use]
+    pub fn coupled(&self) -> Vec<[String; 2]> {
+        let model = self.model();
+        let name = |id: i32| {
+            // Model joint 0 is the free joint.
+            let joint = usize::try_from(id).ok()?.checked_sub(1)?;
+            Some(self.joints.get(joint)?.name.clone())
+        };
+        (0..model.eq_type().len())
+            .filter(|&e| model.eq_type()[e] == MjtEq::mjEQ_JOINT)
+            .filter_map(|e| Some([name(model.eq_obj1id()[e])?, name(model.eq_obj2id()[e])?]))
+            .collect()
+    }
+
     /// The leg on `side`.
     #[must_use]
     pub fn leg(&self, side: Side) -> &Leg {

@@ -2,7 +2,7 @@
 //! whole-body controller find the torques.
 //!
 //! On both feet the centre of mass is led; on one foot it falls as it must and the next foothold catches it
-//! ([`crate::footsteps`]). There is no double support between steps. A start shifts the weight over the first support foot; a
+//! ([`crate::footsteps`]). There is no double support between steps. A start pushes off from the foot that is lifted first ([`crate::start`]); a
 //! stop is a step in place after which both feet stay. Estimates of the state come from outside ([`StateEstimate`]).
 
 use std::sync::Arc;
@@ -15,6 +15,7 @@ use nalgebra::{Rotation2, UnitQuaternion, Vector2, Vector3};
 use crate::footsteps::{Pendulum, PendulumState, Plan, Reach};
 use crate::offsets::{Learner, Offsets};
 use crate::settings::{GRAVITY, Velocity, WalkSettings};
+use crate::start::Start;
 use crate::swing::{Swing, Waypoint};
 use crate::whole_body::{Outcome, Targets, WholeBody};
 use crate::{StateEstimate, WalkError};
@@ -120,8 +121,6 @@ pub struct Gait {
     data: RobotData,
     body: WholeBody,
     pendulum: Pendulum,
-    /// What is known of the pendulum beyond the state, odometry's axes.
-    disturbance: PendulumState,
     learner: Learner,
     mode: Mode,
     /// When the present mode or step began, s.
@@ -138,16 +137,14 @@ pub struct Gait {
     height: f64,
     asked: Velocity,
     velocity: Velocity,
-    /// Added to the velocity: what a body that does not walk as its model needs.
-    trim: Velocity,
     /// Where the swing foot left the ground, m, and its heading then, rad.
     lift_off: (Vector3<f64>, f64),
     /// Waypoint of the swing foot at phase 1/2, m, odometry frame, for the present step.
     waypoint: Option<Vector3<f64>>,
     /// Where a standing body is led, from the middle of the feet, odometry's axes, m: first about where it comes to rest by itself.
     rest: Vector2<f64>,
-    /// Centre of mass at the beginning of a shift from the middle of the feet, in the heading's axes, m.
-    shift_from: Vector2<f64>,
+    /// The shift that is under way, or the last one.
+    start: Start,
     reference: JointCommand,
     started: bool,
     counts: Counts,
@@ -191,7 +188,6 @@ impl Gait {
             settings,
             data,
             body,
-            disturbance: PendulumState { position: Vector2::zeros(), momentum: Vector2::zeros() },
             learner: Learner::new(pendulum.lambda, pendulum.step_time),
             pendulum,
             mode: Mode::Stand,
@@ -204,11 +200,10 @@ impl Gait {
             toe: 0.0,
             asked: Velocity::default(),
             velocity: Velocity::default(),
-            trim: Velocity::default(),
             lift_off: (zero, 0.0),
             waypoint: None,
             rest: Vector2::zeros(),
-            shift_from: Vector2::zeros(),
+            start: Start::default(),
             started: false,
             counts: Counts::default(),
             view,
@@ -283,17 +278,6 @@ impl Gait {
         (slope.abs() > 1e-6).then(|| (way - still) / slope)
     }
 
-    /// From now on the pendulum is off the state by `disturbance`, in the odometry's axes: what a model that walks in place of the
-    /// robot does not show.
-    pub fn disturb(&mut self, disturbance: PendulumState) {
-        self.disturbance = disturbance;
-    }
-
-    /// From now on `trim` is added to the velocity.
-    pub fn set_trim(&mut self, trim: Velocity) {
-        self.trim = trim;
-    }
-
     /// The present swing, as it would be led through `waypoint` (m, odometry frame).
     #[must_use]
     pub fn swing(&self, waypoint: Option<Vector3<f64>>) -> Swing {
@@ -342,7 +326,7 @@ impl Gait {
         self.approach(period);
         self.change(state);
         self.heading += if matches!(self.mode, Mode::Step { .. }) {
-            (self.velocity.turn + self.trim.turn) * period
+            self.velocity.turn * period
         } else {
             wrap(self.feet_heading() + self.toe - self.heading)
         };
@@ -380,10 +364,7 @@ impl Gait {
             + arm.cross(&Vector3::new(momentum[0], momentum[1], momentum[2]));
         let scale = 1.0 / (self.robot.mass() * self.settings.gait.height);
         let turn = Rotation2::new(-heading);
-        PendulumState {
-            position: turn * (arm.xy() + self.disturbance.position),
-            momentum: turn * (Vector2::new(about.y, -about.x) * scale + self.disturbance.momentum),
-        }
+        PendulumState { position: turn * arm.xy(), momentum: turn * Vector2::new(about.y, -about.x) * scale }
     }
 
     /// Time until the swing foot is expected to come down, s.
@@ -459,14 +440,18 @@ impl Gait {
                     self.lift(support, state.time);
                 } else if !self.asked.is_zero() {
                     let leftward = self.asked.y > 0.0 || (self.asked.y == 0.0 && self.asked.turn > 0.0);
+                    let support = if leftward { Side::Right } else { Side::Left };
                     let middle = 0.5 * (self.view.feet[0] + self.view.feet[1]);
-                    self.shift_from = Rotation2::new(-self.heading) * (self.view.com - middle).xy();
-                    self.mode = Mode::Shift { support: if leftward { Side::Right } else { Side::Left } };
+                    let from = Rotation2::new(-self.heading) * (self.view.com - middle).xy();
+                    let foot = if support == Side::Left { 0.5 } else { -0.5 } * self.apart();
+                    self.start =
+                        Start::new(from, foot, -self.pendulum.sway(support), self.pendulum.lambda, gait.start_time);
+                    self.mode = Mode::Shift { support };
                     self.since = state.time;
                 }
             }
             Mode::Shift { support } => {
-                if elapsed >= gait.start_time {
+                if elapsed >= self.start.duration() {
                     self.lift(support, state.time);
                 }
             }
@@ -550,25 +535,13 @@ impl Gait {
             self.creep();
             shift.position += Vector3::new(self.rest.x, self.rest.y, 0.0);
         }
-        if let Some(support) = support {
-            let time = self.last_time - self.since;
-            let outward = if support == Side::Left { 1.0 } else { -1.0 };
-            let half = 0.5 * self.pendulum.lambda * self.pendulum.step_time;
-            let speed = outward * 0.5 * self.settings.gait.width * self.pendulum.lambda * half.tanh();
-            let duration = self.settings.gait.start_time;
-            let across = sway(self.shift_from.y, speed, duration, time);
-            // Ahead, over the support foot.
-            let to = 0.5 * self.apart().x * outward;
-            let ahead = sway(self.shift_from.x - to, 0.0, duration, time);
+        if support.is_some() {
             let turn = Rotation2::new(self.heading);
-            let put = |at: &mut Vector3<f64>, ahead: f64, across: f64| {
-                let moved = turn * Vector2::new(ahead, across);
-                at.x += moved.x;
-                at.y += moved.y;
-            };
-            put(&mut shift.position, to + ahead[0], across[0]);
-            put(&mut shift.velocity, ahead[1], across[1]);
-            put(&mut shift.acceleration, ahead[2], across[2]);
+            let [position, velocity, acceleration] =
+                self.start.at(self.last_time - self.since).map(|moved| turn * moved);
+            shift.position += Vector3::new(position.x, position.y, 0.0);
+            shift.velocity += Vector3::new(velocity.x, velocity.y, 0.0);
+            shift.acceleration += Vector3::new(acceleration.x, acceleration.y, 0.0);
         }
         self.view.phase = 0.0;
         // A standing body keeps its heading to its feet, which its legs tell exactly. Held to the world, it turns as fast as its gyro
@@ -592,12 +565,11 @@ impl Gait {
         let step_time = gait.step_time;
         let reach = Reach { ahead: gait.reach, across: gait.across };
         let (swing, phase) = (support.other(), self.phase);
-        let velocity = Vector2::new(self.velocity.x + self.trim.x, self.velocity.y + self.trim.y);
+        let velocity = Vector2::new(self.velocity.x, self.velocity.y);
         self.pendulum.width = gait.width.max(velocity.y.abs() * step_time + reach.across[0] + SPARE);
         // A stop takes all momentum away at once.
         self.pendulum.alpha = if self.asked.is_zero() { 1.0 } else { gait.alpha };
-        let (turn, fed, touchdown) =
-            (self.velocity.turn + self.trim.turn, self.fed(self.swung()), self.learner.offsets.touchdown);
+        let (turn, fed, touchdown) = (self.velocity.turn, self.fed(self.swung()), self.learner.offsets.touchdown);
         // Frames turn: the foothold is chosen in the axes that the gait will have at the touchdown.
         self.pendulum.step_time = self.learner.offsets.step_time;
         let hurry = if self.asked.is_zero() { HURRY } else { 1.0 };
@@ -647,7 +619,7 @@ impl Gait {
     }
 
     /// Counts how a tick was solved.
-    pub(crate) fn count(&mut self, outcome: Outcome) {
+    fn count(&mut self, outcome: Outcome) {
         match outcome {
             Outcome::Solved => {}
             Outcome::Relaxed => self.counts.relaxed += 1,
@@ -677,23 +649,6 @@ impl Gait {
             command.torques[j] = self.body.torques[j];
         }
     }
-}
-
-/// A quintic from rest at `from` (m) to 0 with `speed` (m/s) and no acceleration after `duration` (s): position, velocity,
-/// acceleration at `time`.
-fn sway(from: f64, speed: f64, duration: f64, time: f64) -> [f64; 3] {
-    let s = (time / duration).clamp(0.0, 1.0);
-    let r = 1.0 - s;
-    // 1 - smoothstep, and the arrival of the swing polynomial.
-    let fall =
-        [1.0 - s * s * s * (10.0 - 15.0 * s + 6.0 * s * s), -30.0 * s * s * r * r, -60.0 * s * r * (1.0 - 2.0 * s)];
-    let arrive = [
-        s * s * s * (-4.0 + 7.0 * s - 3.0 * s * s),
-        s * s * (-12.0 + 28.0 * s - 15.0 * s * s),
-        s * (-24.0 + 84.0 * s - 60.0 * s * s),
-    ];
-    let value = |k: usize| from * fall[k] + speed * duration * arrive[k];
-    [value(0), value(1) / duration, value(2) / (duration * duration)]
 }
 
 /// An angle that goes smoothly from `from` to `to` over phases 0 to 1, with its rate.

@@ -284,12 +284,12 @@ impl InGait {
 
     /// What the gait is asked in this tick.
     fn steer(&mut self, aim: &Aim, ball: &Ball) -> Velocity {
-        let limits = self.walker.gait().settings().limits.clone();
+        let limits = self.walker.settings().limits.clone();
         let pose = self.walker.odometry();
         let turn = Rotation2::new(-aim.direction);
         let from_robot = turn * (ball.position - Vector2::new(pose[0], pose[1]));
         let side = if self.foot == Side::Left { 1.0 } else { -1.0 };
-        let half = 0.5 * self.walker.gait().settings().gait.width;
+        let half = 0.5 * self.walker.settings().gait.width;
         // The kicking foot's line, with the face's middle over the ball's.
         let beside = from_robot.y - side * (half + self.settings.strike.outward);
         let turned = wrap(aim.direction - pose[2]);
@@ -324,13 +324,13 @@ impl InGait {
     /// Speed ahead with which whole steps bring the support foot of the kick to its place before the ball, m/s.
     fn pace(&mut self, aim: &Aim, ball: &Ball) -> f64 {
         let wanted = self.settings.walk(aim.speed);
-        let view = self.walker.gait().view();
+        let view = self.walker.view();
         let Mode::Step { support } = view.mode else { return wanted };
         let from_support = Rotation2::new(-aim.direction) * (ball.position - view.feet[support as usize].xy());
         let way = from_support.x - self.settings.ideal;
         // Steps until the support foot of the kick stands: an odd number when the other foot is to kick.
         let first = usize::from(support == self.foot);
-        let gait = self.walker.gait_mut();
+        let Some(gait) = self.walker.gait_mut() else { return wanted };
         (0..COUNTS)
             .filter_map(|k| gait.velocity_for(first + 2 * k, way, aim.direction))
             .min_by(|a, b| (a - wanted).abs().total_cmp(&(b - wanted).abs()))
@@ -354,7 +354,8 @@ impl InGait {
 
     /// Speed along the kick with which a swing through `strike` meets the ball's surface, m/s; 0 when it does not.
     fn meeting(&self, aim: &Aim, ball: Vector2<f64>, contact: Vector3<f64>, strike: Vector2<f64>) -> f64 {
-        let swing = self.walker.gait().swing(Some(self.waypoint(contact, strike)));
+        let Some(gait) = self.walker.gait() else { return 0.0 };
+        let swing = gait.swing(Some(self.waypoint(contact, strike)));
         let along = Vector2::new(aim.direction.cos(), aim.direction.sin());
         let surface = ball.dot(&along) - self.radius - self.settings.strike.face;
         (0..=PHASES)
@@ -370,7 +371,7 @@ impl InGait {
 
     /// Touchdowns and lift-offs that the last tick brought: algorithm 1's events.
     fn events(&mut self, aim: &Aim, ball: &Ball, time: f64) {
-        if let Some(step) = self.walker.gait().footstep() {
+        if let Some(step) = self.walker.footstep() {
             if self.stage == Stage::Kick && step.side == self.foot {
                 self.stage = Stage::FollowThrough;
                 self.steps_after = 0;
@@ -382,7 +383,7 @@ impl InGait {
             }
             self.commander.touch_down(step.side);
         }
-        let view = *self.walker.gait().view();
+        let view = *self.walker.view();
         let changed = view.mode != self.was;
         self.was = view.mode;
         if self.stage == Stage::Stop && view.mode == Mode::Stand {
@@ -406,7 +407,9 @@ impl InGait {
             let power = self.power(aim, ball, contact);
             if let Some(strike) = self.commander.lift_off(self.foot, ball, aim.direction, self.radius, power) {
                 let waypoint = self.waypoint(contact, strike);
-                self.walker.gait_mut().set_waypoint(waypoint);
+                if let Some(gait) = self.walker.gait_mut() {
+                    gait.set_waypoint(waypoint);
+                }
                 self.stage = Stage::Kick;
             }
         }
@@ -419,10 +422,10 @@ impl Controller for InGait {
         if let (Some(aim), Some(ball)) = (self.aim, self.ball) {
             let velocity = self.steer(&aim, &ball);
             self.walker.set_velocity(velocity);
-            let targets = self.walker.plan(sensors);
+            let planned = self.walker.plan(sensors, command);
             self.events(&aim, &ball, sensors.time);
             // The kick that was locked in this tick is led from the next one on: a swing begins at rest.
-            let outcome = self.walker.solve(&targets);
+            let outcome = self.walker.solve(planned.as_ref());
             self.walker.write(outcome, command);
         } else {
             self.walker.tick(sensors, command);

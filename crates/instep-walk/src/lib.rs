@@ -2,8 +2,9 @@
 //!
 //! - [`Walker`]: the whole, as a [`instep_robot::control::Controller`].
 //! - [`StateEstimate`]: what walking knows of its robot, the seam between estimator and controller.
-//! - [`gait`]: stands, starts, steps, stops; [`footsteps`] chooses where to, [`swing`] how, [`whole_body`] with which torques,
+//! - [`gait`]: stands, starts (`start.rs`), steps, stops; [`footsteps`] chooses where to, [`swing`] how, [`whole_body`] with which torques,
 //!   by the quadratic program of [`instep_qp`].
+//! - [`pattern`]: the walk of robots whose drives are position servos.
 //! - [`plmk`]: when a kick is locked onto a step, and where it strikes; [`in_gait`] walks up and has it done.
 //! - [`settings`]: all numbers, with defaults that follow from the robot's size.
 //!
@@ -16,9 +17,11 @@ pub mod footsteps;
 pub mod gait;
 pub mod in_gait;
 pub mod offsets;
+pub mod pattern;
 pub mod plmk;
-pub mod servo;
 pub mod settings;
+
+pub mod start;
 mod state;
 pub mod swing;
 mod walker;

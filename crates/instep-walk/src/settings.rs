@@ -77,7 +77,7 @@ pub struct Gait {
     pub reach: f64,
     /// Nearest and farthest foothold across, m: no crossing, no split.
     pub across: [f64; 2],
-    /// Time on both feet at a start, in which the weight goes over the first support foot, s.
+    /// Time at a start in which the weight goes toward the foot that is lifted first, s; from there it falls over the other one.
     pub start_time: f64,
     /// Forward lean of the base, rad.
     pub lean: f64,
@@ -237,7 +237,7 @@ impl WalkSettings {
                 latest: 0.11 * time,
                 reach: 0.92 * height,
                 across: [0.55 * width, 0.78 * height],
-                start_time: 3.0 * time,
+                start_time: 2.0 * time,
                 lean: 0.03,
             },
             limits: Limits {

@@ -7,20 +7,26 @@ use instep_robot::control::{Controller, JointCommand, Sensors};
 use instep_robot::drive::DriveKind;
 
 use crate::estimate::Estimator;
-use crate::servo::Model;
+use crate::gait::{Counts, Footstep, GaitView};
+use crate::pattern::Pattern;
 use crate::whole_body::{Outcome, Targets};
 use crate::{Gait, StateEstimate, Velocity, WalkError, WalkSettings};
 
 /// The gait with its estimator.
 #[derive(Debug)]
 pub struct Walker {
-    gait: Gait,
+    legs: Legs,
     estimator: Estimator,
     state: StateEstimate,
     /// The state of the next tick was told.
     told: bool,
-    /// What walks in place of a robot whose drives are position servos.
-    model: Option<Model>,
+}
+
+/// What walks, by the kind of the drives.
+#[derive(Debug)]
+enum Legs {
+    Torque(Box<Gait>),
+    Servo(Box<Pattern>),
 }
 
 impl Walker {
@@ -38,19 +44,68 @@ impl Walker {
     /// # Errors
     /// When the robot has not what walking needs.
     pub fn new(robot: Arc<Robot>, settings: WalkSettings) -> Result<Self, WalkError> {
-        let is_servo = robot.drives.kind == DriveKind::PositionServo;
         Ok(Self {
             state: StateEstimate::standing(&robot),
             told: false,
-            model: is_servo.then(|| Model::new(Arc::clone(&robot), settings.drive.servo.clone())),
             estimator: Estimator::new(Arc::clone(&robot)),
-            gait: Gait::new(robot, settings)?,
+            legs: match robot.drives.kind {
+                DriveKind::Torque => Legs::Torque(Box::new(Gait::new(robot, settings)?)),
+                DriveKind::PositionServo => Legs::Servo(Box::new(Pattern::new(robot, settings)?)),
+            },
         })
     }
 
     /// Asks for a velocity from now on; returns what the robot is allowed. Zero is a stop, then a stand.
     pub fn set_velocity(&mut self, velocity: Velocity) -> Velocity {
-        self.gait.set_velocity(velocity)
+        match &mut self.legs {
+            Legs::Torque(gait) => gait.set_velocity(velocity),
+            Legs::Servo(pattern) => pattern.set_velocity(velocity),
+        }
+    }
+
+    /// The velocity that the gait is at on its way to what was asked.
+    #[must_use]
+    pub fn velocity(&self) -> Velocity {
+        match &self.legs {
+            Legs::Torque(gait) => gait.velocity(),
+            Legs::Servo(pattern) => pattern.velocity(),
+        }
+    }
+
+    /// The settings.
+    #[must_use]
+    pub fn settings(&self) -> &WalkSettings {
+        match &self.legs {
+            Legs::Torque(gait) => gait.settings(),
+            Legs::Servo(pattern) => pattern.settings(),
+        }
+    }
+
+    /// What the gait wants and sees.
+    #[must_use]
+    pub fn view(&self) -> &GaitView {
+        match &self.legs {
+            Legs::Torque(gait) => gait.view(),
+            Legs::Servo(pattern) => pattern.view(),
+        }
+    }
+
+    /// What happened how often.
+    #[must_use]
+    pub fn counts(&self) -> Counts {
+        match &self.legs {
+            Legs::Torque(gait) => gait.counts(),
+            Legs::Servo(pattern) => pattern.counts(),
+        }
+    }
+
+    /// The step that ended in the last tick, if one did.
+    #[must_use]
+    pub fn footstep(&self) -> Option<Footstep> {
+        match &self.legs {
+            Legs::Torque(gait) => gait.footstep(),
+            Legs::Servo(pattern) => pattern.footstep(),
+        }
     }
 
     /// Where the base is over the ground, in the frame of its start: x, y (m) and heading (rad).
@@ -86,61 +141,65 @@ impl Walker {
         &self.estimator
     }
 
-    /// The gait.
+    /// The gait of a robot whose drives take torques.
     #[must_use]
-    pub fn gait(&self) -> &Gait {
-        &self.gait
+    pub fn gait(&self) -> Option<&Gait> {
+        match &self.legs {
+            Legs::Torque(gait) => Some(gait),
+            Legs::Servo(_) => None,
+        }
     }
 
-    /// First stage of a tick: estimates the state and says what is wanted. The stages are there to be timed one by one;
-    /// [`Controller::tick`] calls all three.
-    pub fn plan(&mut self, sensors: &Sensors) -> Targets {
+    /// See [`Self::gait`]; to lead a swing foot.
+    pub fn gait_mut(&mut self) -> Option<&mut Gait> {
+        match &mut self.legs {
+            Legs::Torque(gait) => Some(gait),
+            Legs::Servo(_) => None,
+        }
+    }
+
+    /// Accelerations (nv) that the last command is to bring; none where drives take no torques.
+    #[must_use]
+    pub fn acceleration(&self) -> &[f64] {
+        self.gait().map_or(&[], |gait| &gait.body().acceleration)
+    }
+
+    /// First stage of a tick: estimates the state and says what is wanted; servos get their command here. The stages are there to be timed
+    /// one by one; [`Controller::tick`] calls all three.
+    pub fn plan(&mut self, sensors: &Sensors, command: &mut JointCommand) -> Option<Targets> {
         if !std::mem::take(&mut self.told) {
             self.estimator.update(sensors, &mut self.state);
         }
         let pose = self.odometry();
-        let Some(model) = &mut self.model else { return self.gait.plan(&self.state) };
-        let steps = model.sense(sensors, &self.state);
-        for _ in 1..steps {
-            model.prepare(&mut self.gait);
-            let targets = self.gait.plan(&model.state);
-            model.watch(&mut self.gait, pose);
-            let outcome = self.gait.solve(&targets);
-            model.integrate(&self.gait, outcome);
-        }
-        model.prepare(&mut self.gait);
-        let targets = self.gait.plan(&model.state);
-        model.watch(&mut self.gait, pose);
-        targets
-    }
-
-    /// Second stage: the whole-body controller.
-    pub fn solve(&mut self, targets: &Targets) -> Outcome {
-        self.gait.solve(targets)
-    }
-
-    /// Last stage: the command.
-    pub fn write(&mut self, outcome: Outcome, command: &mut JointCommand) {
-        match &mut self.model {
-            None => self.gait.write(&self.state, outcome, command),
-            Some(model) => {
-                model.integrate(&self.gait, outcome);
-                model.write(&self.gait, command);
-                self.gait.count(outcome);
+        match &mut self.legs {
+            Legs::Torque(gait) => Some(gait.plan(&self.state)),
+            Legs::Servo(pattern) => {
+                pattern.tick(sensors, &self.state, pose, command);
+                None
             }
         }
     }
 
-    /// The gait, to lead a swing foot.
-    pub fn gait_mut(&mut self) -> &mut Gait {
-        &mut self.gait
+    /// Second stage: the whole-body controller.
+    pub fn solve(&mut self, planned: Option<&Targets>) -> Outcome {
+        match (&mut self.legs, planned) {
+            (Legs::Torque(gait), Some(targets)) => gait.solve(targets),
+            _ => Outcome::Solved,
+        }
+    }
+
+    /// Last stage: the command of torque drives.
+    pub fn write(&mut self, outcome: Outcome, command: &mut JointCommand) {
+        if let Legs::Torque(gait) = &mut self.legs {
+            gait.write(&self.state, outcome, command);
+        }
     }
 }
 
 impl Controller for Walker {
     fn tick(&mut self, sensors: &Sensors, command: &mut JointCommand) {
-        let targets = self.plan(sensors);
-        let outcome = self.solve(&targets);
+        let planned = self.plan(sensors, command);
+        let outcome = self.solve(planned.as_ref());
         self.write(outcome, command);
     }
 }

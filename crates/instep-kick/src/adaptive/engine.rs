@@ -25,17 +25,17 @@ use crate::adaptive::{GRID_FILE, grid_hash, parts};
 use crate::ball::BallModel;
 use crate::derive::{Build, Derive};
 use crate::engine::{BreakOff, Face, KickEngine, KickPlan, KickStatus, Phase, Progress};
-use crate::ik::Ik;
 use crate::request::{KickRequest, Place, Refusal, Strength};
 use crate::settings::Settings;
 use crate::stand::{self, Standing};
-use crate::tree::TreePose;
 use crate::whole_body::body::Body;
 use crate::whole_body::drive::{Drive, Footing, Wanted};
 use crate::whole_body::motion::Motion;
 use crate::whole_body::timeline::Course;
 use crate::whole_body::torque::Dynamics;
 use crate::whole_body::watch::Watch;
+use instep_robot::ik::Ik;
+use instep_robot::tree::TreePose;
 
 /// Distance between the ball and the one of the present stroke from which on another is looked up, m.
 const MOVED: f64 = 0.004;

@@ -24,11 +24,11 @@ use instep_robot::Robot;
 
 use crate::KickError;
 use crate::ball::BallModel;
-use crate::ik::{Ik, Weights};
 use crate::whole_body::body::Body;
 use crate::whole_body::drive::{Drive, Loop, pressure};
 use crate::whole_body::inclination::Lean;
 use crate::whole_body::torque::Dynamics;
+use instep_robot::ik::{Ik, Weights};
 
 pub use engine::{AdaptiveKick, Outlook, load_grid};
 pub use grid::Grid;

@@ -12,13 +12,13 @@ use crate::adaptive::lookup::{Found, Query, look_up_all};
 use crate::adaptive::motion::{self, Stroke};
 use crate::adaptive::settings::AdaptiveSettings;
 use crate::engine::{Face, KickPlan};
-use crate::ik::Ik;
 use crate::request::{KickRequest, Place, Refusal};
-use crate::tree::TreePose;
 use crate::whole_body::body::Body;
 use crate::whole_body::forecast::{Demands, FAR, MIDDLE, Rehearsal, graver, ground_gap, judge, miss};
 use crate::whole_body::motion::{Motion, goals};
 use crate::whole_body::torque::Dynamics;
+use instep_robot::ik::Ik;
+use instep_robot::tree::TreePose;
 
 /// Strokes whose whole way is forecast.
 const FORECASTS: usize = 8;

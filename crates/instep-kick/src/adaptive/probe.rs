@@ -16,13 +16,13 @@ use crate::KickError;
 use crate::adaptive::grid::{CELL, CELLS, Cell, Grid};
 use crate::adaptive::settings::AdaptiveSettings;
 use crate::ball::BallModel;
-use crate::ik::Ik;
 use crate::settings::Settings;
-use crate::tree::TreePose;
 use crate::whole_body::body::Body;
 use crate::whole_body::drive::{Drive, Footing, Wanted};
 use crate::whole_body::motion::goals;
 use crate::whole_body::path::Path;
+use instep_robot::ik::Ik;
+use instep_robot::tree::TreePose;
 
 /// A probe plays no ball.
 const NO_BALL: BallModel = BallModel { radius: 0.1, mass: 0.4, restitution: 0.5, deceleration: 0.4 };

@@ -14,13 +14,13 @@ use nalgebra::{Vector2, Vector3};
 use crate::dynamic::motion::{self, Stroke};
 use crate::dynamic::settings::DynamicSettings;
 use crate::engine::{Face, KickPlan};
-use crate::ik::Ik;
 use crate::request::{KickRequest, Place, Refusal};
 use crate::whole_body::body::Body;
 use crate::whole_body::foot::{FacePoint, contact_point, paper_choice, paper_face, wrap};
 use crate::whole_body::forecast::{Demands, FAR, MIDDLE, NEAR, Rehearsal, check_place, graver, judge};
 use crate::whole_body::motion::{Motion, goals};
 use crate::whole_body::torque::Dynamics;
+use instep_robot::ik::Ik;
 
 /// The share of the asked speed below which a slower stroke is no answer.
 const SLOWEST: f64 = 0.8;

@@ -9,7 +9,7 @@ use instep_robot::control::Sensors;
 use instep_robot::{LinkPoint, Robot};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
-use crate::tree::{Tree, TreePose};
+use instep_robot::tree::{Tree, TreePose};
 
 /// Load from which a contact point counts as standing, N.
 const LOADED: f64 = 15.0;

@@ -6,13 +6,13 @@ use instep_motion::phase::Side;
 use instep_motion::spline::State;
 
 use crate::engine::Phase;
-use crate::ik::Goals;
 use crate::preview::settings::PreviewSettings;
 use crate::preview::stroke::Stroke;
 use crate::whole_body::body::Body;
 use crate::whole_body::motion::{place, way_back};
 use crate::whole_body::path::Path;
 use crate::whole_body::timeline::Timeline;
+use instep_robot::ik::Goals;
 
 /// Half the step of the differences that give the foot's speed, s.
 const STEP: f64 = 1e-4;

@@ -19,13 +19,13 @@ use crate::preview::regulator::Regulator;
 use crate::preview::settings::PreviewSettings;
 use crate::preview::stroke::{Shape, Stroke};
 use crate::request::{KickRequest, Place, Refusal};
-use crate::tree::TreePose;
 use crate::whole_body::body::Body;
 use crate::whole_body::foot::{contact_point, paper_choice, paper_face, wrap};
 use crate::whole_body::forecast::{
     FAR, MIDDLE, NEAR, ROLL, TIPPING, WAY, check_place, fastest, graver, judge, miss, outside,
 };
 use crate::whole_body::torque::Dynamics;
+use instep_robot::tree::TreePose;
 
 /// How long a motor may have to give more than it can outside the kick, s: the drives ride over less.
 const HELD: f64 = 0.06;

@@ -8,7 +8,7 @@
 //!
 //! Its error, measured on NAO (tests/it/preview.rs): one solution for the way from the stand to the support foot, 5 cm,
 //! misses by 4.7 mm; solved anew in each tick of a kick, it is 0.1 mm (RMS) and 1.4 mm at most. The inverse kinematics of
-//! the whole body, [`crate::ik`], which the engine uses unless told otherwise, misses by less than 0.01 mm.
+//! the whole body, [`instep_robot::ik`], which the engine uses unless told otherwise, misses by less than 0.01 mm.
 //!
 //! The paper's slips: (8) prints r without squares. In (9) and (11) alpha - pi and alpha + pi are the same angle, and
 //! theta_2 = alpha - pi does not go with theta_1 = phi - beta. The two solutions of the arm are
@@ -20,9 +20,9 @@ use instep_robot::{LinkPoint, Robot};
 use nalgebra::{Matrix3, Vector2, Vector3};
 
 use crate::KickError;
-use crate::ik::{Goals, Ik, Residual};
-use crate::tree::{Tree, TreePose};
 use crate::whole_body::body::{Body, ankle_roll};
+use instep_robot::ik::{Goals, Ik, Residual};
+use instep_robot::tree::{Tree, TreePose};
 
 /// Largest turn of a joint in one step, rad.
 const STEP: f64 = 0.3;

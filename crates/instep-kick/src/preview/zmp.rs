@@ -20,8 +20,8 @@ use serde::{Deserialize, Serialize};
 use crate::KickError;
 use crate::preview::regulator::cart_table;
 use crate::preview::riccati;
-use crate::tree::{Tree, TreePose};
 use crate::whole_body::drive::{GRAVITY, LOADED, up};
+use instep_robot::tree::{Tree, TreePose};
 
 /// How much the filter trusts what; standard deviations.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

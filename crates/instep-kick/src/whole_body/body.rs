@@ -11,8 +11,8 @@ use nalgebra::{Rotation2, Rotation3, Vector2, Vector3};
 use crate::KickError;
 use crate::ball::BallModel;
 use crate::request::Refusal;
-use crate::tree::{Capsule, Tree, TreePose};
 use crate::whole_body::foot::Foot;
+use instep_robot::tree::{Capsule, Tree, TreePose};
 
 /// Gap between ball and rising foot, in units of the leg's length.
 const AWAY: f64 = 0.08;

@@ -9,13 +9,13 @@ use instep_robot::control::{JointCommand, Sensors};
 use instep_robot::drive::tell;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
-use crate::ik::{Goals, Ik};
-use crate::tree::TreePose;
 use crate::whole_body::balance::Balance;
 use crate::whole_body::body::Body;
 use crate::whole_body::inclination::Lean;
 use crate::whole_body::settings::Feedback;
 use crate::whole_body::torque::Dynamics;
+use instep_robot::ik::{Goals, Ik};
+use instep_robot::tree::TreePose;
 
 /// Steps of inverse kinematics in a tick.
 const TICK_STEPS: usize = 3;

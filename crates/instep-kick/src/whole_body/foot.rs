@@ -11,7 +11,7 @@ use instep_robot::Robot;
 use nalgebra::{Rotation2, Vector2, Vector3};
 
 use crate::engine::Face;
-use crate::tree::{Tree, TreePose};
+use instep_robot::tree::{Tree, TreePose};
 
 /// Capsule ends that reach this near to the farthest belong to the same face, m.
 const FLUSH: f64 = 0.006;

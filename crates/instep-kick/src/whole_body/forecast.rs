@@ -6,14 +6,14 @@ use instep_robot::Robot;
 use nalgebra::{Vector2, Vector3};
 
 use crate::engine::Phase;
-use crate::ik::{Goals, Ik, Residual};
 use crate::request::{Place, Refusal};
-use crate::tree::TreePose;
 use crate::whole_body::body::Body;
 use crate::whole_body::foot::Foot;
 use crate::whole_body::motion::{Manner, Motion};
 use crate::whole_body::settings::Limits;
 use crate::whole_body::torque::Dynamics;
+use instep_robot::ik::{Goals, Ik, Residual};
+use instep_robot::tree::TreePose;
 
 /// Steps of inverse kinematics to a place that is far from the last.
 pub(crate) const FAR: usize = 12;

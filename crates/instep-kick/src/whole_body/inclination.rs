@@ -7,8 +7,8 @@
 use serde::{Deserialize, Serialize};
 
 use crate::KickError;
-use crate::ik::Goals;
 use crate::settings::within;
+use instep_robot::ik::Goals;
 
 /// Numbers of the body-inclination stabiliser.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

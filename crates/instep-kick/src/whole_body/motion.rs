@@ -6,11 +6,11 @@ use instep_motion::spline::State;
 use nalgebra::Vector3;
 
 use crate::engine::Phase;
-use crate::ik::Goals;
 use crate::whole_body::body::Body;
 use crate::whole_body::path::Path;
 use crate::whole_body::settings::{Stance, Times};
 use crate::whole_body::timeline::Timeline;
+use instep_robot::ik::Goals;
 
 /// What a motion takes from an engine's settings.
 #[derive(Debug, Clone, Copy)]

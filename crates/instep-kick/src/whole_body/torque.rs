@@ -10,8 +10,8 @@ use instep_robot::control::torque_range;
 use instep_robot::{Robot, RobotData};
 use nalgebra::{Rotation3, UnitQuaternion, Vector3};
 
-use crate::tree::TreePose;
 use crate::whole_body::body::Body;
+use instep_robot::tree::TreePose;
 
 /// Scratch space for one trajectory.
 #[derive(Debug)]

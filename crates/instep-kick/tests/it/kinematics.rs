@@ -1,8 +1,8 @@
 //! The tree against MuJoCo's own kinematics, and inverse kinematics against random reachable poses.
 
-use instep_kick::ik::{Goals, Ik};
-use instep_kick::tree::Tree;
 use instep_motion::phase::Side;
+use instep_robot::ik::{Goals, Ik};
+use instep_robot::tree::Tree;
 use nalgebra::{Rotation3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -61,7 +61,7 @@ fn walk(name: &str, velocity: Velocity, duration: f64, period: f64, seed: u64) -
             squares += (v[0] - estimate.v[0]).powi(2) + (v[1] - estimate.v[1]).powi(2);
             samples += 1.0;
         }
-        let stands = walker.gait().view().mode == Mode::Stand && v[0].hypot(v[1]) < 0.1;
+        let stands = walker.view().mode == Mode::Stand && v[0].hypot(v[1]) < 0.1;
         stop = if time >= duration && stands { stop.min(time) } else { duration + 2.0 };
     }
     Walked {

@@ -12,11 +12,10 @@
 //! unknown. Finds the nearest local solution from where it starts; allocates nothing after `new`.
 
 use instep_motion::phase::Side;
-use instep_robot::{LinkPoint, Robot};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
-use crate::KickError;
 use crate::tree::{Tree, TreePose};
+use crate::{LinkPoint, Robot};
 
 /// Most unknowns: two legs of seven joints.
 const UNKNOWNS: usize = 14;
@@ -24,6 +23,18 @@ const UNKNOWNS: usize = 14;
 const ROWS: usize = 12;
 /// Largest change of a joint in one step, rad.
 const STEP: f64 = 0.4;
+
+/// Why a robot's legs cannot be solved.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{field}: {found}; expected {expected}")]
+pub struct IkError {
+    /// What is wrong: `coupled` or `leg`.
+    pub field: String,
+    /// What is there.
+    pub found: String,
+    /// What would be right.
+    pub expected: String,
+}
 
 /// Importance of each goal; the residual times this is what is minimised.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -130,7 +141,7 @@ impl Ik {
     ///
     /// # Errors
     /// When a coupled joint is not there, or the legs have more than fourteen joints.
-    pub fn new(robot: &Robot, coupled: &[[String; 2]], margin: f64, bend: f64) -> Result<Self, KickError> {
+    pub fn new(robot: &Robot, coupled: &[[String; 2]], margin: f64, bend: f64) -> Result<Self, IkError> {
         let mut unknowns: Vec<[Option<usize>; 2]> = Vec::new();
         for leg in &robot.legs {
             // The toe keeps its standing angle.
@@ -143,7 +154,7 @@ impl Ik {
                 });
                 let partner = partner
                     .map(|p| {
-                        robot.joint_index(p).ok_or_else(|| KickError::Setting {
+                        robot.joint_index(p).ok_or_else(|| IkError {
                             field: "coupled".into(),
                             found: format!("\"{p}\""),
                             expected: format!("a joint of {}", robot.name),
@@ -156,7 +167,7 @@ impl Ik {
             }
         }
         if unknowns.len() > UNKNOWNS {
-            return Err(KickError::Setting {
+            return Err(IkError {
                 field: "leg".into(),
                 found: format!("{} joints in both legs", unknowns.len()),
                 expected: format!("at most {UNKNOWNS}"),
@@ -202,13 +213,7 @@ impl Ik {
     ///
     /// # Errors
     /// As [`Ik::new`].
-    pub fn of_leg(
-        robot: &Robot,
-        coupled: &[[String; 2]],
-        margin: f64,
-        bend: f64,
-        side: Side,
-    ) -> Result<Self, KickError> {
+    pub fn of_leg(robot: &Robot, coupled: &[[String; 2]], margin: f64, bend: f64, side: Side) -> Result<Self, IkError> {
         let mut ik = Self::new(robot, coupled, margin, bend)?;
         let of_leg = |joints: &[Option<usize>; 2]| {
             joints[1].is_none() && joints[0].is_some_and(|joint| robot.leg(side).joints().any(|j| j == joint))

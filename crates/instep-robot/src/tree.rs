@@ -6,9 +6,10 @@
 //! base frame. A point's Jacobian column for joint j is axis x (point - anchor); the centre of mass's is that of the
 //! joint's subtree, weighted by its share of the mass. Nothing here knows velocities, forces or the ground.
 
-use instep_robot::{LinkPoint, Robot, closest_points};
 use mujoco_rs::prelude::MjtGeomBase;
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
+
+use crate::{LinkPoint, Robot, closest_points};
 
 /// One link of the tree.
 #[derive(Debug, Clone)]
