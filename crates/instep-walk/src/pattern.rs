@@ -5,8 +5,7 @@
 //! load take ([`instep_robot::Joint::servo_target`]). The real robot is let in where it matters:
 //!
 //! - A step ends when the swing foot bears load, not by the clock; a foot that is late is waited for, and the pendulum with it.
-//! - How the trunk tilts beside the plan turns the ankles of the feet that stand against it, and shifts the foothold: a body turned about its
-//!   support foot has its centre of mass elsewhere.
+//! - How the trunk tilts beside the plan turns the ankles of the feet that stand against it. (Footholds that follow the tilt were tried, and it fell.)
 //! - What the way of two steps is short of what was asked is added, slowly.
 //!
 //! Source: own. Ending a step by the foot's load and gyro feedback at the ankles are as in B. Hengst, rUNSWift walk 2014 (report, UNSW 2014);
@@ -31,7 +30,7 @@ use crate::{StateEstimate, WalkError};
 /// Largest tilt that is reacted to, rad.
 const TILT: f64 = 0.3;
 /// Share of the velocity that is missing over two steps that is added, and most that is added: of sqrt(g H), and rad/s.
-const TRIM: [f64; 3] = [0.3, 0.15, 0.3];
+const TRIM: [f64; 3] = [0.05, 0.06, 0.2];
 /// How much faster it slows down than it speeds up.
 const BRAKE: f64 = 4.0;
 /// Kept from every joint's limit, and least bend of a knee, rad.
@@ -416,11 +415,13 @@ impl Pattern {
     /// On one foot: the pendulum falls, the other foot goes where it is caught.
     fn step(&mut self, period: f64) {
         let gait = &self.settings.gait;
-        let servo = &self.settings.drive.servo;
         let (step_time, swing) = (gait.step_time, self.support.other());
         // A foot that is late is waited for.
         let passed = (period / step_time).min((1.0 - self.phase).max(0.0));
-        self.com = self.pendulum.ahead(&self.com, passed * step_time);
+        // A pendulum that is out of reach of any step is that of a robot that has fallen.
+        if self.com.position.norm() < gait.reach {
+            self.com = self.pendulum.ahead(&self.com, passed * step_time);
+        }
         self.phase += period / step_time;
 
         let reach = Reach { ahead: gait.reach, across: gait.across };
@@ -428,10 +429,8 @@ impl Pattern {
         let turn = self.velocity.turn + self.trim.turn;
         self.pendulum.width = gait.width.max(velocity.y.abs() * step_time + reach.across[0]);
         self.pendulum.alpha = gait.alpha;
-        let off = self.tilt.map(|tilt| tilt * (gait.height * servo.foothold));
-        let seen = PendulumState { position: self.com.position + off[0], momentum: self.com.momentum + off[1] };
         let left = (1.0 - self.phase).max(0.0) * step_time;
-        let wanted = self.pendulum.foothold(&seen, left, velocity, 0.0, Vector2::zeros(), swing);
+        let wanted = self.pendulum.foothold(&self.com, left, velocity, 0.0, Vector2::zeros(), swing);
         let foothold = reach.clip(wanted, swing);
         let way = Swing {
             from: self.lift_off.0,

@@ -166,7 +166,7 @@ pub struct Drive {
     pub servo: Servo,
 }
 
-/// How position servos are led; see [`crate::servo`].
+/// How position servos are led; see [`crate::pattern`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Servo {
@@ -174,11 +174,9 @@ pub struct Servo {
     pub tilt: f64,
     /// See `tilt`; for its rate, s.
     pub rate: f64,
-    /// Share of a tilt that the footholds react to.
-    pub foothold: f64,
-    /// Lag of the tilt that both see, s.
+    /// Lag of the tilt that they see, s.
     pub lag: f64,
-    /// Phase from which a foot that touches the ground ends the step.
+    /// Phase from which a foot that touches the ground ends the step; much before it, left and right steps drift apart.
     pub earliest: f64,
 }
 
@@ -218,6 +216,7 @@ impl WalkSettings {
             );
         }
         let is_servo = robot.drives.kind == DriveKind::PositionServo;
+        let of = |torque: f64, servo: f64| if is_servo { servo } else { torque };
         let height = 0.91 * standing;
         let time = (height / GRAVITY).sqrt();
         // Gains are in units of the pendulum's time: 0.268 s for ARTEMIS.
@@ -225,27 +224,28 @@ impl WalkSettings {
         let task = |weight: f64, kp: f64, kd: f64| Task::new(weight, kp * rate.powi(2).min(2.0), kd * rate.min(1.4));
         Ok(Self {
             gait: Gait {
-                // Servos are late: they want slower steps.
-                step_time: if is_servo { 2.0 } else { 1.49 } * time,
-                width: 1.1 * width,
+                // Servos are late: they want slower steps, higher ones, longer waits and a body that leans into its way. Their numbers were fitted
+                // to NAO and Wolfgang together.
+                step_time: of(1.49, 2.02) * time,
+                width: of(1.1, 1.03) * width,
                 height,
-                clearance: 0.1 * height,
+                clearance: of(0.1, 0.155) * height,
                 alpha: 0.9,
                 speed_gain: 0.92,
-                landing_speed: 0.15 * (height / 0.705).sqrt(),
+                landing_speed: of(0.15, 0.077) * (height / 0.705).sqrt(),
                 earliest: 0.7,
-                latest: 0.11 * time,
+                latest: of(0.11, 0.7) * time,
                 reach: 0.92 * height,
                 across: [0.55 * width, 0.78 * height],
                 start_time: 2.0 * time,
-                lean: 0.03,
+                lean: of(0.03, 0.115),
             },
             limits: Limits {
-                forward: 0.57 * (GRAVITY * height).sqrt(),
-                backward: 0.2 * (GRAVITY * height).sqrt(),
-                sideways: 0.152 * (GRAVITY * height).sqrt(),
-                turn: 1.2,
-                acceleration: 0.15 * GRAVITY,
+                forward: of(0.57, 0.19) * (GRAVITY * height).sqrt(),
+                backward: of(0.2, 0.1) * (GRAVITY * height).sqrt(),
+                sideways: of(0.152, 0.08) * (GRAVITY * height).sqrt(),
+                turn: of(1.2, 0.8),
+                acceleration: of(0.15, 0.05) * GRAVITY,
                 turn_acceleration: 2.0,
             },
             control: Control {
@@ -266,10 +266,7 @@ impl WalkSettings {
                 look_ahead: 0.06,
                 torque_share: 1.0,
             },
-            drive: Drive {
-                leak: 10.0,
-                servo: Servo { tilt: 0.5, rate: 0.6 * time, foothold: 0.0, lag: 0.01, earliest: 0.85 },
-            },
+            drive: Drive { leak: 10.0, servo: Servo { tilt: 0.25, rate: 0.58 * time, lag: 0.016, earliest: 0.97 } },
         })
     }
 
@@ -346,7 +343,6 @@ impl WalkSettings {
             ("drive.leak", self.drive.leak),
             ("drive.servo.tilt", self.drive.servo.tilt),
             ("drive.servo.rate", self.drive.servo.rate),
-            ("drive.servo.foothold", self.drive.servo.foothold),
             ("drive.servo.lag", self.drive.servo.lag),
             ("drive.servo.earliest", self.drive.servo.earliest),
         ] {

@@ -18,6 +18,8 @@ use crate::whole_body::{FootModel, ground_point};
 
 /// Share of the weight from which a foot stands, and below which it has left the ground; half of that for heel and toe.
 const LOAD: [f64; 2] = [0.07, 0.035];
+/// How many deviations of a foot sensor's zero its reading must be beyond.
+const ZERO: f64 = 3.0;
 /// How a standing point creeps, m/s/sqrt(Hz): yaw leans on it, so it is what soft ground does; real slips are thrown out.
 const SLIP: f64 = 0.001;
 /// Least noise of gyro (rad/s), accelerometer (m/s^2) and kinematics (m): soft ground, bending legs.
@@ -90,17 +92,21 @@ impl Estimator {
         let (data, robot) = (&self.data, &self.robot);
         let weight = robot.mass() * GRAVITY;
         let first = self.filter.is_none();
+        // What as many sensors read whose zeros are off, once in a few hundred robots, is no load.
+        let zero = |sensors: usize| ZERO * robot.senses.foot_offset * (sensors as f64).sqrt();
         let contacts: [Contact; CONTACTS] = std::array::from_fn(|i| {
             let points = &self.points[i];
             let load: f64 = points.iter().map(|&c| sensors.contact_forces[c]).sum();
-            self.bears[i] = !points.is_empty() && load > 0.5 * weight * LOAD[usize::from(self.bears[i] && !first)];
+            self.bears[i] = !points.is_empty()
+                && load > (0.5 * weight * LOAD[usize::from(self.bears[i] && !first)]).max(zero(points.len()));
             let sum: Vector3<f64> = points.iter().map(|&c| data.point(&robot.contacts[c].at)).sum();
             Contact { stands: self.bears[i], point: sum / points.len().max(1) as f64 - robot.imu.point }
         });
         for (i, foot) in self.feet.iter().enumerate() {
             let load: f64 = foot.contacts.iter().map(|&c| sensors.contact_forces[c]).sum();
             state.load[i] = load;
-            state.contact[i] = load > weight * LOAD[usize::from(state.contact[i] && !first)];
+            state.contact[i] =
+                load > (weight * LOAD[usize::from(state.contact[i] && !first)]).max(zero(foot.contacts.len()));
         }
 
         let rate = Vector3::from(sensors.gyro);
