@@ -18,6 +18,7 @@ use instep_walk::in_gait::InGaitSettings;
 use crate::BenchError;
 use crate::in_gait::InGaitKick;
 use crate::scenario::Size;
+use crate::walk_up::{WalkUp, WalkUpSettings};
 
 /// An engine that was made for a robot, or why not.
 type Made = Result<Box<dyn KickEngine + Send>, BenchError>;
@@ -128,6 +129,7 @@ const ENTRIES: &[Entry] = &[
         },
     },
     Entry { name: "in-gait", file: "in-gait.toml", make: |subject, file, text| subject.in_gait(file, text) },
+    Entry { name: "walk-up", file: "walk-up.toml", make: |subject, file, text| subject.walk_up(file, text) },
     Entry { name: "policy", file: "policy.toml", make: |subject, file, text| subject.policy(file, text) },
 ];
 
@@ -136,7 +138,7 @@ const ENTRIES: &[Entry] = &[
 /// `adaptive-inclination` has the paper's stabiliser. `…-paper` is an engine with its paper's own stabiliser and placement alone:
 /// `dynamic-paper` the PID on foot pressure, `adaptive-paper` body inclination and the foot as a sphere, `preview-paper` the filter
 /// with the preview loop (alone: `preview-filter`) and the two-link arm (alone: `preview-two-link`). `policy` starts in a
-/// run-up, `in-gait` from the stand a run-up away from the ball.
+/// run-up, `in-gait` from the stand a run-up away from the ball; `walk-up` walks to where a standing engine kicks from.
 pub fn engines() -> impl Iterator<Item = &'static str> {
     ENTRIES.iter().map(|entry| entry.name)
 }
@@ -333,6 +335,14 @@ impl Subject {
     fn in_gait(&self, file: &str, text: &str) -> Made {
         let settings = InGaitSettings::parse(file, text)?;
         Ok(Box::new(InGaitKick::new(&self.robot, self.ball, settings, self.footprint)?))
+    }
+
+    fn walk_up(&self, file: &str, text: &str) -> Made {
+        let settings: WalkUpSettings = toml::from_str(text)
+            .map_err(|e| BenchError::File { file: file.into(), detail: e.to_string().trim_end().to_owned() })?;
+        let inner = entry(&settings.engine)?;
+        let engine = (inner.make)(self, inner.file, &self.settings(inner.name)?)?;
+        Ok(Box::new(WalkUp::new(&self.robot, engine, &settings, self.footprint)?))
     }
 
     fn adaptive(&self, file: &str, text: &str, change: fn(&mut AdaptiveSettings)) -> Made {

@@ -27,6 +27,7 @@ pub mod run;
 pub mod scenario;
 pub mod table;
 pub mod walk_bench;
+pub mod walk_up;
 pub mod walking;
 pub mod walking_body;
 

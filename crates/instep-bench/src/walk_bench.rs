@@ -19,7 +19,7 @@ use serde::Serialize;
 use crate::BenchError;
 use crate::walking::{Asked, Push, WalkTask, walk};
 
-/// How long a robot walks, s; the long walk of the highest speed.
+/// How long a robot walks, s, and how long in a long walk.
 const DURATION: [f64; 2] = [12.0, 60.0];
 /// How long a push lasts, s.
 const PUSH: f64 = 0.1;
@@ -27,6 +27,8 @@ const PUSH: f64 = 0.1;
 const MOMENTUM: f64 = 37.5 * 2.63;
 /// Speeds ahead, m/s.
 const AHEAD: [f64; 5] = [0.1, 0.2, 0.5, 0.8, 1.2];
+/// Those of the long walks, m/s.
+const LONG: [f64; 4] = [0.2, 0.25, 0.8, 1.2];
 
 /// One scenario.
 #[derive(Debug, Clone, PartialEq)]
@@ -104,9 +106,10 @@ pub fn scenarios() -> Vec<WalkScenario> {
     let scenario = |name: String, what| WalkScenario { name, what, duration: DURATION[0] };
     let steady = |name: String, x: f64, y: f64, turn: f64| scenario(name, What::Steady(Velocity { x, y, turn }));
     let mut all: Vec<_> = AHEAD.iter().map(|&x| steady(format!("ahead-{x}"), x, 0.0, 0.0)).collect();
-    let fastest = AHEAD[AHEAD.len() - 1];
-    let long = steady(format!("ahead-{fastest}-long"), fastest, 0.0, 0.0);
-    all.push(WalkScenario { duration: DURATION[1], ..long });
+    all.extend(LONG.iter().map(|&x| {
+        let long = steady(format!("ahead-{x}-long"), x, 0.0, 0.0);
+        WalkScenario { duration: DURATION[1], ..long }
+    }));
     all.push(steady("sideways-0.4".into(), 0.0, 0.4, 0.0));
     all.push(steady("turn-1".into(), 0.0, 0.0, 1.0));
     all.push(scenario("mix".into(), What::Mix));

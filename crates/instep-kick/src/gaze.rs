@@ -45,20 +45,28 @@ pub struct Gaze {
     angles: Vec<f64>,
 }
 
+/// Joints of `robot`'s neck: those between trunk and camera that carry nothing else; none where there is no camera.
+pub(crate) fn neck(robot: &Robot, tree: &Tree) -> Vec<usize> {
+    let Some(camera) = robot.camera else { return Vec::new() };
+    let joints = 0..robot.joints.len();
+    let carries_camera = |joint: usize| tree.moves(joint, camera.at.link);
+    joints
+        .clone()
+        .filter(|&joint| {
+            let beyond = |&other: &usize| tree.moves(joint, tree.link_of(other));
+            carries_camera(joint) && joints.clone().filter(beyond).all(carries_camera)
+        })
+        .collect()
+}
+
 impl Gaze {
     /// Of `robot`, whose footprint is at `footprint` (m, world) when it stands; `None` where it has no camera or no neck.
     #[must_use]
     pub fn of(robot: &Robot, footprint: [f64; 2]) -> Option<Self> {
         let camera = robot.camera?;
         let tree = Tree::new(robot);
-        let joints = 0..robot.joints.len();
-        let carries_camera = |joint: usize| tree.moves(joint, camera.at.link);
-        let neck: Vec<_> = joints
-            .clone()
-            .filter(|&joint| {
-                let beyond = |&other: &usize| tree.moves(joint, tree.link_of(other));
-                carries_camera(joint) && joints.clone().filter(beyond).all(carries_camera)
-            })
+        let neck: Vec<_> = neck(robot, &tree)
+            .into_iter()
             .map(|joint| {
                 let [least, greatest] = robot.joints[joint].range;
                 (joint, [least + MARGIN, greatest - MARGIN])

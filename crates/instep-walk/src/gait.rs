@@ -137,6 +137,8 @@ pub struct Gait {
     height: f64,
     asked: Velocity,
     velocity: Velocity,
+    /// Velocity ahead at the last two lift-offs, m/s.
+    paced: [f64; 2],
     /// Where the swing foot left the ground, m, and its heading then, rad.
     lift_off: (Vector3<f64>, f64),
     /// Waypoint of the swing foot at phase 1/2, m, odometry frame, for the present step.
@@ -200,6 +202,7 @@ impl Gait {
             toe: 0.0,
             asked: Velocity::default(),
             velocity: Velocity::default(),
+            paced: [0.0; 2],
             lift_off: (zero, 0.0),
             waypoint: None,
             rest: Vector2::zeros(),
@@ -389,10 +392,10 @@ impl Gait {
         right + 0.5 * wrap(left - right)
     }
 
-    /// Speed ahead of a gait whose steps are all as the present one, m/s: the leg swings twice as fast.
+    /// Speed ahead of a gait whose legs all swing as in the present step, m/s: from where the one before the last put the foot to where it is to
+    /// be now. (Told by the foothold itself it would feed back on the foothold.)
     fn swung(&self) -> f64 {
-        let way = Rotation2::new(-self.heading) * (self.view.foothold - self.lift_off.0).xy();
-        0.5 * way.x / self.settings.gait.step_time
+        0.5 * (self.paced[0] + self.paced[1])
     }
 
     /// Height of the ground under the feet that carry, m.
@@ -511,11 +514,9 @@ impl Gait {
     /// The foot other than `support` leaves the ground.
     fn lift(&mut self, support: Side, time: f64) {
         let swing = support.other();
-        // The foot swings as far again until it is known better.
-        let swung = self.view.foothold - self.lift_off.0;
         let heading = self.link_heading(self.body.feet[swing as usize].reference.link);
         self.lift_off = (self.view.feet[swing as usize], self.heading + wrap(heading - self.heading));
-        self.view.foothold = self.lift_off.0 + if self.counts.steps > 0 { swung } else { Vector3::zeros() };
+        self.paced = [self.paced[1], self.velocity.x];
         self.mode = Mode::Step { support };
         self.since = time;
         self.waypoint = None;

@@ -12,18 +12,13 @@ use instep_robot::control::{Controller, JointCommand, Sensors};
 use nalgebra::{Rotation2, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
+use crate::ball::BallMemory;
 use crate::gait::Mode;
 use crate::plmk::{KickCommander, Sight, Strike};
 use crate::{Velocity, WalkError, WalkSettings, Walker, approach};
 
-/// Poses that are kept, so that a sight finds where the robot was: ticks.
-const POSES: usize = 512;
 /// A sight older than this is not fresh, s.
 const FRESH: f64 = 1.0;
-/// Variance of a sight at its own distance, (m, share of the distance), and growth of the ball's variance, m^2/s.
-const SIGHT: [f64; 2] = [0.01, 0.03];
-/// See [`SIGHT`].
-const WANDER: f64 = 1e-4;
 /// How fast the run-up closes errors across and of the heading, 1/s.
 const STEER: [f64; 2] = [1.2, 1.5];
 /// Fastest step across in the run-up, m/s.
@@ -101,14 +96,6 @@ pub enum Stage {
     Done,
 }
 
-/// A ball at rest as it is known, odometry frame.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Ball {
-    position: Vector2<f64>,
-    variance: f64,
-    seen: f64,
-}
-
 /// The walker with what kicks.
 #[derive(Debug)]
 pub struct InGait {
@@ -117,14 +104,10 @@ pub struct InGait {
     commander: KickCommander,
     radius: f64,
     aim: Option<Aim>,
-    ball: Option<Ball>,
+    ball: BallMemory,
     stage: Stage,
     foot: Side,
     steps_after: usize,
-    /// Times and poses (x, y, heading) of the last ticks.
-    poses: Vec<(f64, [f64; 3])>,
-    tick: usize,
-    last_sight: f64,
     was: Mode,
 }
 
@@ -186,13 +169,10 @@ impl InGait {
             settings,
             radius,
             aim: None,
-            ball: None,
+            ball: BallMemory::default(),
             stage: Stage::Idle,
             foot: Side::Left,
             steps_after: 0,
-            poses: vec![(f64::NEG_INFINITY, [0.0; 3]); POSES],
-            tick: 0,
-            last_sight: f64::NEG_INFINITY,
             was: Mode::Stand,
         })
     }
@@ -203,7 +183,7 @@ impl InGait {
         let [x, y, _] = self.walker.odometry();
         let beside = (Vector2::from(aim.ball) - Vector2::new(x, y)).dot(&across);
         self.foot = aim.foot.unwrap_or(if beside > 0.0 { Side::Left } else { Side::Right });
-        self.ball = Some(Ball { position: aim.ball.into(), variance: 0.05_f64.powi(2), seen: f64::NEG_INFINITY });
+        self.ball.expect(aim.ball.into());
         self.aim = Some(aim);
         self.stage = Stage::Approach;
     }
@@ -243,14 +223,15 @@ impl InGait {
     pub fn release(&mut self) {
         if self.stage != Stage::Kick {
             self.commander.cancel();
-            (self.aim, self.ball, self.stage) = (None, None, Stage::Idle);
+            self.ball.forget();
+            (self.aim, self.stage) = (None, Stage::Idle);
         }
     }
 
     /// Where the ball is, as far as it is known: odometry's frame, m.
     #[must_use]
     pub fn ball(&self) -> Option<[f64; 2]> {
-        self.ball.map(|ball| ball.position.into())
+        self.ball.position().map(Into::into)
     }
 
     /// The settings.
@@ -259,35 +240,12 @@ impl InGait {
         &self.settings
     }
 
-    /// A sight of the ball goes into the odometry's frame at its own time; a Kalman filter of a resting ball.
-    fn see(&mut self, sensors: &Sensors) {
-        let Some(sight) = sensors.ball.filter(|sight| sight.time > self.last_sight) else { return };
-        let Some(ball) = &mut self.ball else { return };
-        let older = |from: &&(f64, [f64; 3])| from.0 <= sight.time + 1e-9;
-        let Some((_, [x, y, heading])) = self.poses.iter().filter(older).max_by(|a, b| a.0.total_cmp(&b.0)) else {
-            return;
-        };
-        let local = Vector2::new(sight.position[0], sight.position[1]);
-        let seen = Vector2::new(*x, *y) + Rotation2::new(*heading) * local;
-        if !(seen.x + seen.y).is_finite() {
-            return;
-        }
-        let noise = (SIGHT[0] + SIGHT[1] * local.norm()).powi(2);
-        let since = if ball.seen.is_finite() { (sight.time - ball.seen).max(0.0) } else { 0.0 };
-        let variance = ball.variance + WANDER * since;
-        let gain = variance / (variance + noise);
-        ball.position += (seen - ball.position) * gain;
-        ball.variance = variance * (1.0 - gain);
-        ball.seen = sight.time;
-        self.last_sight = sight.time;
-    }
-
     /// What the gait is asked in this tick.
-    fn steer(&mut self, aim: &Aim, ball: &Ball) -> Velocity {
+    fn steer(&mut self, aim: &Aim, ball: Vector2<f64>) -> Velocity {
         let limits = self.walker.settings().limits.clone();
         let pose = self.walker.odometry();
         let turn = Rotation2::new(-aim.direction);
-        let from_robot = turn * (ball.position - Vector2::new(pose[0], pose[1]));
+        let from_robot = turn * (ball - Vector2::new(pose[0], pose[1]));
         let side = if self.foot == Side::Left { 1.0 } else { -1.0 };
         let half = 0.5 * self.walker.settings().gait.width;
         // The kicking foot's line, with the face's middle over the ball's.
@@ -322,11 +280,11 @@ impl InGait {
     }
 
     /// Speed ahead with which whole steps bring the support foot of the kick to its place before the ball, m/s.
-    fn pace(&mut self, aim: &Aim, ball: &Ball) -> f64 {
+    fn pace(&mut self, aim: &Aim, ball: Vector2<f64>) -> f64 {
         let wanted = self.settings.walk(aim.speed);
         let view = self.walker.view();
         let Mode::Step { support } = view.mode else { return wanted };
-        let from_support = Rotation2::new(-aim.direction) * (ball.position - view.feet[support as usize].xy());
+        let from_support = Rotation2::new(-aim.direction) * (ball - view.feet[support as usize].xy());
         let way = from_support.x - self.settings.ideal;
         // Steps until the support foot of the kick stands: an odd number when the other foot is to kick.
         let first = usize::from(support == self.foot);
@@ -370,7 +328,7 @@ impl InGait {
     }
 
     /// Touchdowns and lift-offs that the last tick brought: algorithm 1's events.
-    fn events(&mut self, aim: &Aim, ball: &Ball, time: f64) {
+    fn events(&mut self, aim: &Aim, ball: Vector2<f64>, time: f64) {
         if let Some(step) = self.walker.footstep() {
             if self.stage == Stage::Kick && step.side == self.foot {
                 self.stage = Stage::FollowThrough;
@@ -394,18 +352,18 @@ impl InGait {
             return;
         }
         let pose = self.walker.odometry();
-        let local = Rotation2::new(-pose[2]) * (ball.position - Vector2::new(pose[0], pose[1]));
+        let local = Rotation2::new(-pose[2]) * (ball - Vector2::new(pose[0], pose[1]));
         let sight = Sight {
             balancing: false,
-            ball: (time - ball.seen < FRESH).then_some([local.x, local.y]),
+            ball: self.ball.seen().is_some_and(|seen| time - seen < FRESH).then_some([local.x, local.y]),
             speed: view.com_velocity.x * pose[2].cos() + view.com_velocity.y * pose[2].sin(),
         };
         self.commander.look(&sight, Some(self.foot));
         if changed && support.other() == self.foot {
             let contact = view.feet[support as usize];
-            let ball = ball.position - contact.xy();
-            let power = self.power(aim, ball, contact);
-            if let Some(strike) = self.commander.lift_off(self.foot, ball, aim.direction, self.radius, power) {
+            let from_contact = ball - contact.xy();
+            let power = self.power(aim, from_contact, contact);
+            if let Some(strike) = self.commander.lift_off(self.foot, from_contact, aim.direction, self.radius, power) {
                 let waypoint = self.waypoint(contact, strike);
                 if let Some(gait) = self.walker.gait_mut() {
                     gait.set_waypoint(waypoint);
@@ -418,20 +376,19 @@ impl InGait {
 
 impl Controller for InGait {
     fn tick(&mut self, sensors: &Sensors, command: &mut JointCommand) {
-        self.see(sensors);
-        if let (Some(aim), Some(ball)) = (self.aim, self.ball) {
-            let velocity = self.steer(&aim, &ball);
+        self.ball.see(sensors);
+        if let (Some(aim), Some(ball)) = (self.aim, self.ball.position()) {
+            let velocity = self.steer(&aim, ball);
             self.walker.set_velocity(velocity);
             let planned = self.walker.plan(sensors, command);
-            self.events(&aim, &ball, sensors.time);
+            self.events(&aim, ball, sensors.time);
             // The kick that was locked in this tick is led from the next one on: a swing begins at rest.
             let outcome = self.walker.solve(planned.as_ref());
             self.walker.write(outcome, command);
         } else {
             self.walker.tick(sensors, command);
         }
-        self.poses[self.tick % POSES] = (sensors.time, self.walker.odometry());
-        self.tick += 1;
+        self.ball.at(sensors.time, self.walker.odometry());
     }
 }
 

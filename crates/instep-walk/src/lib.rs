@@ -11,6 +11,7 @@
 //! Maths only: no simulator, no clock, no camera, no field. A tick allocates nothing.
 
 pub mod approach;
+pub mod ball;
 mod error;
 pub mod estimate;
 pub mod footsteps;

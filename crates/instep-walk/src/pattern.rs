@@ -56,6 +56,9 @@ const OFF: f64 = 0.01;
 const BLEND: f64 = 0.5;
 /// Where the capture point may be when a walk ends: share of the half length of a foot, and of half the distance across.
 const STOP: [f64; 2] = [0.6, 0.9];
+/// How far the feet may be apart ahead when a walk ends, as a share of the half length of a foot, and how far turned, rad: whoever
+/// takes the robot over finds it in a stand.
+const STAGGER: [f64; 2] = [0.3, 0.03];
 
 /// A pendulum that walks in place of the robot.
 #[derive(Debug)]
@@ -226,6 +229,11 @@ impl Pattern {
         self.footstep
     }
 
+    /// Somebody else moved the joints: the next tick begins from where they are.
+    pub fn resume(&mut self) {
+        self.began = None;
+    }
+
     /// One tick: `estimate` is of the real robot's state, `pose` its place (x, y, heading).
     pub fn tick(&mut self, sensors: &Sensors, estimate: &StateEstimate, pose: [f64; 3], command: &mut JointCommand) {
         let begins = self.began.is_none();
@@ -368,7 +376,8 @@ impl Pattern {
         let capture = self.com.position + self.com.momentum / self.pendulum.lambda - 0.5 * apart;
         self.asked.is_zero()
             && self.velocity.is_zero()
-            && apart.x.abs() < self.half_length
+            && apart.x.abs() < STAGGER[0] * self.half_length
+            && self.other.1.abs() < STAGGER[1]
             && capture.x.abs() < STOP[0] * self.half_length
             && capture.y.abs() < 0.5 * STOP[1] * apart.y.abs()
     }
@@ -425,8 +434,10 @@ impl Pattern {
         self.phase += period / step_time;
 
         let reach = Reach { ahead: gait.reach, across: gait.across };
-        let velocity = Vector2::new(self.velocity.x + self.trim.x, self.velocity.y + self.trim.y);
-        let turn = self.velocity.turn + self.trim.turn;
+        // A walk that ends brings the feet side by side.
+        let Velocity { x, y, turn } = if self.asked.is_zero() { Velocity::default() } else { self.trim };
+        let velocity = Vector2::new(self.velocity.x + x, self.velocity.y + y);
+        let turn = self.velocity.turn + turn;
         self.pendulum.width = gait.width.max(velocity.y.abs() * step_time + reach.across[0]);
         self.pendulum.alpha = gait.alpha;
         let left = (1.0 - self.phase).max(0.0) * step_time;

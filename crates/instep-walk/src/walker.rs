@@ -164,6 +164,13 @@ impl Walker {
         self.gait().map_or(&[], |gait| &gait.body().acceleration)
     }
 
+    /// Somebody else moved the joints since the last tick.
+    pub fn resume(&mut self) {
+        if let Legs::Servo(pattern) = &mut self.legs {
+            pattern.resume();
+        }
+    }
+
     /// First stage of a tick: estimates the state and says what is wanted; servos get their command here. The stages are there to be timed
     /// one by one; [`Controller::tick`] calls all three.
     pub fn plan(&mut self, sensors: &Sensors, command: &mut JointCommand) -> Option<Targets> {

@@ -10,6 +10,7 @@ use nalgebra::{Rotation2, Rotation3, Vector2, Vector3};
 
 use crate::KickError;
 use crate::ball::BallModel;
+use crate::gaze::neck;
 use crate::request::Refusal;
 use crate::whole_body::foot::Foot;
 use instep_robot::tree::{Capsule, Tree, TreePose};
@@ -42,6 +43,8 @@ pub(crate) struct Stand {
 /// A robot with what the engine computes once.
 #[derive(Debug)]
 pub(crate) struct Body {
+    /// Joints of the neck: they look elsewhere and stand all the same.
+    neck: Vec<usize>,
     pub(crate) robot: Arc<Robot>,
     pub(crate) ball: BallModel,
     pub(crate) tree: Tree,
@@ -121,7 +124,8 @@ impl Body {
         let (turn, sole) = (pose.rotation[left.link].transpose(), pose.point(&left));
         let place = |capsule: &Capsule| (pose.axis_of(capsule).map(|end| turn * (end - sole)), capsule.radius);
         let standing = strikers.iter().flatten().map(place).collect();
-        Ok(Self { robot, ball, tree, feet, stands, angles, arms, half_width, leg_length, strikers, standing })
+        let neck = neck(&robot, &tree);
+        Ok(Self { neck, robot, ball, tree, feet, stands, angles, arms, half_width, leg_length, strikers, standing })
     }
 
     /// Sets the joints that are no leg's: `share` 0 is the stand, 1 the foot up.
@@ -164,6 +168,9 @@ impl Body {
     /// Names the joint.
     pub(crate) fn check_standing(&self, sensors: &Sensors, most: f64) -> Result<(), Refusal> {
         for (joint, (now, stand)) in sensors.joint_positions.iter().zip(&self.angles).enumerate() {
+            if self.neck.contains(&joint) {
+                continue;
+            }
             let off = now - stand;
             // Written so that a NaN fails.
             if !matches!(off.abs().partial_cmp(&most), Some(o) if o.is_le()) {
