@@ -5,6 +5,7 @@ mod adaptive;
 mod follow;
 mod gaze;
 mod servo;
+mod walk_up;
 mod walking;
 
 use std::path::{Path, PathBuf};

@@ -91,7 +91,8 @@ fn robots_walk_on_position_servos_at_their_own_rate() {
             let walked = walk(name, Velocity { x: speed, y: 0.0, turn: 0.0 }, 10.0, period, seed);
             println!("{walked:?}");
             assert!((walked.mean[0] - speed).abs() < 0.15 * speed && walked.mean[1].abs() < 0.06, "{name}: {walked:?}");
-            assert!(walked.stop < 1.2, "{name}: {walked:?}");
+            // A step or two more than torque drives need, until the feet are side by side.
+            assert!(walked.stop < 1.8, "{name}: {walked:?}");
             assert_eq!(walked.allocations, 0);
         }
     }
