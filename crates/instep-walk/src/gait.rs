@@ -447,6 +447,8 @@ impl Gait {
                     let middle = 0.5 * (self.view.feet[0] + self.view.feet[1]);
                     let from = Rotation2::new(-self.heading) * (self.view.com - middle).xy();
                     let foot = if support == Side::Left { 0.5 } else { -0.5 } * self.apart();
+                    // The sway of a walk with the feet as far apart as they are.
+                    self.pendulum.width = self.apart().y;
                     self.start =
                         Start::new(from, foot, -self.pendulum.sway(support), self.pendulum.lambda, gait.start_time);
                     self.mode = Mode::Shift { support };

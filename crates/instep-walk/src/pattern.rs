@@ -56,9 +56,9 @@ const OFF: f64 = 0.01;
 const BLEND: f64 = 0.5;
 /// Where the capture point may be when a walk ends: share of the half length of a foot, and of half the distance across.
 const STOP: [f64; 2] = [0.6, 0.9];
-/// How far the feet may be apart ahead when a walk ends, as a share of the half length of a foot, and how far turned, rad: whoever
-/// takes the robot over finds it in a stand.
-const STAGGER: [f64; 2] = [0.3, 0.03];
+/// How far the feet may be apart ahead when a walk ends, as a share of the half length of a foot, how far turned, rad, and how far off the
+/// gait's width, as a share of it: whoever takes the robot over finds it in a stand.
+const STAGGER: [f64; 3] = [0.3, 0.05, 0.6];
 
 /// A pendulum that walks in place of the robot.
 #[derive(Debug)]
@@ -308,6 +308,8 @@ impl Pattern {
                         self.swap();
                     }
                     let middle = 0.5 * self.other.0.xy();
+                    // The sway of a walk with the feet as far apart as they are.
+                    self.pendulum.width = self.other.0.y.abs();
                     let speed = -self.pendulum.sway(support);
                     let Pendulum { lambda, .. } = self.pendulum;
                     let time = self.settings.gait.start_time;
@@ -378,6 +380,7 @@ impl Pattern {
             && self.velocity.is_zero()
             && apart.x.abs() < STAGGER[0] * self.half_length
             && self.other.1.abs() < STAGGER[1]
+            && (apart.y.abs() / self.settings.gait.width - 1.0).abs() < STAGGER[2]
             && capture.x.abs() < STOP[0] * self.half_length
             && capture.y.abs() < 0.5 * STOP[1] * apart.y.abs()
     }
