@@ -14,16 +14,13 @@ use instep_walk::WalkSettings;
 use instep_walk::in_gait::{Aim, InGait, InGaitSettings, Stage};
 
 use crate::BenchError;
+use crate::run_up;
 use crate::walking::PERIOD;
 
 /// The ball of its own start, footprint frame, m, and its speed as a share of the greatest.
 const OWN: ([f64; 2], f64) = ([1.5, 0.1], 0.8);
-/// Nearest ball that can be walked up to, m from the footprint; and farthest.
+/// Nearest ball that can be walked up to, m from the footprint.
 const NEAREST: f64 = 0.45;
-/// See [`NEAREST`].
-const FARTHEST: f64 = 20.0;
-/// A ball that rolls faster than this does not rest, m/s.
-const STILL: f64 = 0.05;
 /// A kick that has not come this long after its forecast is given up, s.
 const PATIENCE: f64 = 15.0;
 /// Time from the contact to the stand, s, and from the ask to the first step.
@@ -106,26 +103,12 @@ impl KickEngine for InGaitKick {
     }
 
     fn plan(&mut self, request: &KickRequest, sensors: &Sensors) -> Result<KickPlan, Refusal> {
-        request.check()?;
-        if self.is_running() {
-            return Err(Refusal::Busy);
-        }
-        if request.hold {
-            return Err(Refusal::CannotHold);
-        }
-        let rolls = request.ball_velocity[0].hypot(request.ball_velocity[1]);
-        if rolls > STILL {
-            return Err(Refusal::BallRolls { speed: rolls, most: STILL });
-        }
-        let distance = request.ball[0].hypot(request.ball[1]);
+        let distance = run_up::distance(request, self.is_running())?;
         if distance < NEAREST {
             return Err(Refusal::BallUnderRobot {
                 gap: distance - self.ball.radius,
                 least: NEAREST - self.ball.radius,
             });
-        }
-        if distance > FARTHEST {
-            return Err(Refusal::TooFar { distance, reach: FARTHEST });
         }
         let settings = self.kick.settings();
         let (speed, [_, most]) = (self.ball_speed(request.strength), settings.speeds());

@@ -24,6 +24,7 @@ pub mod in_gait;
 pub mod page;
 pub mod reach;
 pub mod run;
+mod run_up;
 pub mod scenario;
 pub mod table;
 pub mod walk_bench;

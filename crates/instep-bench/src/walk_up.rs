@@ -18,13 +18,10 @@ use nalgebra::{Rotation2, Vector2};
 use serde::{Deserialize, Serialize};
 
 use crate::BenchError;
+use crate::run_up;
 
 /// How often the robot steps to another place before it gives up.
 const TRIES: usize = 4;
-/// Farthest ball that is walked up to, m from the footprint.
-const FARTHEST: f64 = 20.0;
-/// A ball that rolls faster than this does not rest, m/s.
-const STILL: f64 = 0.05;
 /// How long a robot stands before it goes over into the engine's stand, how long that takes, and how long it then looks at the ball, s.
 const PAUSES: [f64; 3] = [0.4, 1.5, 0.4];
 /// Forecast of the walk, m/s as a share of the fastest, and what starts and stops take, s.
@@ -77,8 +74,8 @@ pub struct WalkUp {
     asked: Option<Asked>,
     tries: usize,
     plan: Option<KickPlan>,
-    /// When it was planned, when it began to kick, and now, s.
-    times: [f64; 3],
+    /// When it was planned, and now, s.
+    times: [f64; 2],
     cancelled: bool,
     given_up: Option<BreakOff>,
     from: Vec<f64>,
@@ -115,7 +112,7 @@ impl WalkUp {
             asked: None,
             tries: 0,
             plan: None,
-            times: [0.0; 3],
+            times: [0.0; 2],
             cancelled: false,
             given_up: None,
             from: vec![0.0; joints],
@@ -150,9 +147,9 @@ impl WalkUp {
         !matches!(self.stage, Stage::Idle | Stage::Done)
     }
 
-    fn give_up(&mut self, why: BreakOff) {
-        self.given_up = Some(why);
-        self.stage = Stage::Done;
+    /// Whether there will be no kick: it stops, and goes over into the engine's stand all the same.
+    fn is_off(&self) -> bool {
+        self.cancelled || self.given_up.is_some()
     }
 
     /// From the stand: kicks, or steps elsewhere.
@@ -161,7 +158,6 @@ impl WalkUp {
         match self.engine.plan(&local, sensors) {
             Ok(_) => {
                 self.stage = Stage::Kick;
-                self.times[1] = sensors.time;
             }
             Err(_) if self.tries < TRIES => {
                 self.tries += 1;
@@ -171,28 +167,24 @@ impl WalkUp {
                         self.walker.resume();
                         self.stage = Stage::Approach;
                     }
-                    None => self.give_up(BreakOff::Unaimed),
+                    None => (self.given_up, self.stage) = (Some(BreakOff::Unaimed), Stage::Done),
                 }
             }
-            Err(_) => self.give_up(BreakOff::Unaimed),
+            Err(_) => (self.given_up, self.stage) = (Some(BreakOff::Unaimed), Stage::Done),
         }
     }
 
     fn go_on(&mut self, sensors: &Sensors) {
         let now = sensors.time;
-        if self.cancelled && matches!(self.stage, Stage::Approach) {
-            self.stage = Stage::Stop(now);
-        }
         match self.stage {
             Stage::Approach => {
                 let velocity = self.asked.map_or_else(Velocity::default, |asked| self.toward(&asked));
                 self.walker.set_velocity(velocity);
-                let late = self.plan.is_some_and(|plan| now - self.times[0] > PATIENCE * plan.contact);
-                if velocity.is_zero() {
+                if self.plan.is_some_and(|plan| now - self.times[0] > PATIENCE * plan.contact) {
+                    self.given_up = Some(BreakOff::Late);
+                }
+                if velocity.is_zero() || self.is_off() {
                     self.stage = Stage::Stop(now);
-                } else if late {
-                    self.walker.set_velocity(Velocity::default());
-                    self.give_up(BreakOff::Late);
                 }
             }
             Stage::Stop(since) => {
@@ -200,10 +192,16 @@ impl WalkUp {
                 if self.walker.view().mode != Mode::Stand {
                     self.stage = Stage::Stop(now);
                 } else if now - since > PAUSES[0] {
-                    self.stage = if self.cancelled { Stage::Done } else { Stage::Settle(now) };
+                    self.stage = Stage::Settle(now);
                 }
             }
-            Stage::Settle(since) if now - since > PAUSES[1] + PAUSES[2] => self.begin(sensors),
+            Stage::Settle(since) if now - since > PAUSES[1] + PAUSES[2] => {
+                if self.is_off() {
+                    self.stage = Stage::Done;
+                } else {
+                    self.begin(sensors);
+                }
+            }
             Stage::Kick => {
                 let status = self.engine.progress().status;
                 if matches!(status, KickStatus::Finished | KickStatus::Cancelled) {
@@ -227,7 +225,7 @@ fn wrap(angle: f64) -> f64 {
 
 impl Controller for WalkUp {
     fn tick(&mut self, sensors: &Sensors, command: &mut JointCommand) {
-        self.times[2] = sensors.time;
+        self.times[1] = sensors.time;
         self.ball.see(sensors);
         self.go_on(sensors);
         match self.stage {
@@ -235,17 +233,18 @@ impl Controller for WalkUp {
                 self.walker.tick(sensors, command);
                 self.from.copy_from_slice(&command.positions);
             }
-            Stage::Settle(since) => {
+            _ => {
                 // The walker stands on beside it, so that it knows where it is.
                 self.walker.tick(sensors, &mut self.scratch);
                 self.engine.tick(sensors, command);
-                let s = ((sensors.time - since) / PAUSES[1]).clamp(0.0, 1.0);
-                let share = s * s * (3.0 - 2.0 * s);
-                for (position, from) in command.positions.iter_mut().zip(&self.from) {
-                    *position = from + (*position - from) * share;
-                }
             }
-            Stage::Idle | Stage::Kick | Stage::Done => self.engine.tick(sensors, command),
+        }
+        if let Stage::Settle(since) = self.stage {
+            let s = ((sensors.time - since) / PAUSES[1]).clamp(0.0, 1.0);
+            let share = s * s * (3.0 - 2.0 * s);
+            for (position, from) in command.positions.iter_mut().zip(&self.from) {
+                *position = from + (*position - from) * share;
+            }
         }
         self.ball.at(sensors.time, self.walker.odometry());
     }
@@ -265,31 +264,16 @@ impl KickEngine for WalkUp {
     }
 
     fn plan(&mut self, request: &KickRequest, sensors: &Sensors) -> Result<KickPlan, Refusal> {
-        request.check()?;
-        if self.is_running() {
-            return Err(Refusal::Busy);
-        }
-        if request.hold {
-            return Err(Refusal::CannotHold);
-        }
-        let rolls = request.ball_velocity[0].hypot(request.ball_velocity[1]);
-        if rolls > STILL {
-            return Err(Refusal::BallRolls { speed: rolls, most: STILL });
-        }
-        let distance = request.ball[0].hypot(request.ball[1]);
-        if distance > FARTHEST {
-            return Err(Refusal::TooFar { distance, reach: FARTHEST });
-        }
-        let Some(stand) = self.engine.where_to_stand(request) else {
-            // Not from anywhere: the engine knows why.
-            let seen = Standing { position: [0.0; 2], heading: 0.0 }.seen_from(request);
-            return match self.engine.plan(&seen, sensors) {
-                Err(refusal) => Err(refusal),
-                Ok(_) => {
-                    self.engine.cancel();
-                    Err(Refusal::TooFar { distance, reach: FARTHEST })
-                }
-            };
+        run_up::distance(request, self.is_running())?;
+        // Where no place will do, the one for its own kick tells why.
+        let own = KickRequest { strength: self.start.request.strength, ..*request };
+        let stand = self.engine.where_to_stand(request).or_else(|| self.engine.where_to_stand(&own));
+        let Some(stand) = stand else {
+            // From here or from nowhere.
+            let plan = self.engine.plan(request, sensors)?;
+            (self.stage, self.plan) = (Stage::Kick, Some(plan));
+            (self.times, self.cancelled, self.given_up) = ([sensors.time; 2], false, None);
+            return Ok(plan);
         };
         let way = stand.position[0].hypot(stand.position[1]);
         let contact = WAY.1 + way / (WAY.0 * self.walk.limits.forward);
@@ -310,7 +294,7 @@ impl KickEngine for WalkUp {
         self.walker.resume();
         self.stage = Stage::Approach;
         self.plan = Some(plan);
-        (self.times, self.tries) = ([sensors.time; 3], 0);
+        (self.times, self.tries) = ([sensors.time; 2], 0);
         (self.cancelled, self.given_up) = (false, None);
         Ok(plan)
     }
@@ -340,7 +324,7 @@ impl KickEngine for WalkUp {
             _ => Phase::Shift,
         };
         let running = self.is_running();
-        let at = self.times[2] - self.times[0];
+        let at = self.times[1] - self.times[0];
         let done = match (self.stage, self.plan) {
             (Stage::Done, _) => 1.0,
             (_, Some(plan)) if running => (at / plan.duration).clamp(0.0, 0.99),

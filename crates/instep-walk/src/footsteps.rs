@@ -12,6 +12,8 @@
 use instep_motion::phase::Side;
 use nalgebra::{Rotation2, Vector2};
 
+use crate::settings::{GRAVITY, Gait};
+
 /// The pendulum and the wanted gait.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pendulum {
@@ -35,6 +37,12 @@ pub struct PendulumState {
 }
 
 impl Pendulum {
+    /// Of a gait.
+    #[must_use]
+    pub fn of(gait: &Gait) -> Self {
+        Self { lambda: (GRAVITY / gait.height).sqrt(), step_time: gait.step_time, width: gait.width, alpha: gait.alpha }
+    }
+
     /// The state `time` (s) later.
     #[must_use]
     pub fn ahead(&self, state: &PendulumState, time: f64) -> PendulumState {
@@ -155,7 +163,7 @@ impl Pendulum {
         foot: Side,
         mut foothold: impl FnMut(&Self, f64) -> Vector2<f64>,
     ) -> Plan {
-        let to_momentum = self.lambda * (self.lambda * self.step_time).sinh() * self.lambda / crate::settings::GRAVITY;
+        let to_momentum = self.lambda * (self.lambda * self.step_time).sinh() * self.lambda / GRAVITY;
         let mut judge = |power: i32| {
             let rate = nominal * STEP.powi(power);
             let wanted = foothold(self, (ahead / rate).max(0.0));

@@ -46,9 +46,10 @@ const CREEP: f64 = 0.02;
 const HEIGHT_RATE: f64 = 0.35;
 
 /// What the gait does.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Mode {
     /// Stands on both feet.
+    #[default]
     Stand,
     /// On both feet, the weight going over `support`.
     Shift {
@@ -91,7 +92,7 @@ pub struct Counts {
 }
 
 /// What the gait wants and sees in a tick; for reports and for the kick.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct GaitView {
     /// What it does.
     pub mode: Mode,
@@ -165,24 +166,8 @@ impl Gait {
         let body = WholeBody::new(Arc::clone(&robot), settings.control.clone());
         let gait = &settings.gait;
         let step_time = gait.step_time;
-        let pendulum = Pendulum {
-            lambda: (GRAVITY / gait.height).sqrt(),
-            step_time: gait.step_time,
-            width: gait.width,
-            alpha: gait.alpha,
-        };
+        let pendulum = Pendulum::of(gait);
         let zero = Vector3::zeros();
-        let view = GaitView {
-            mode: Mode::Stand,
-            phase: 0.0,
-            momentum: Vector2::zeros(),
-            wanted: Vector2::zeros(),
-            foothold: zero,
-            heading: 0.0,
-            com: zero,
-            com_velocity: zero,
-            feet: [zero; 2],
-        };
         Ok(Self {
             reference: JointCommand::zeros(robot.joints.len()),
             height: data.com().z,
@@ -209,7 +194,7 @@ impl Gait {
             start: Start::default(),
             started: false,
             counts: Counts::default(),
-            view,
+            view: GaitView::default(),
             footstep: None,
         })
     }
@@ -408,19 +393,10 @@ impl Gait {
 
     /// The velocity goes toward what was asked as fast as the limits allow.
     fn approach(&mut self, period: f64) {
-        let limits = &self.settings.limits;
-        let toward = |from: f64, to: f64, most: f64| {
-            let most = if to.abs() < from.abs() { BRAKE * most } else { most };
-            from + (to - from).clamp(-most, most)
+        self.velocity = match self.mode {
+            Mode::Step { .. } => self.settings.limits.approach(self.velocity, self.asked, BRAKE, period),
+            _ => Velocity::default(),
         };
-        let (now, asked) = (&mut self.velocity, &self.asked);
-        if matches!(self.mode, Mode::Step { .. }) {
-            now.x = toward(now.x, asked.x, limits.acceleration * period);
-            now.y = toward(now.y, asked.y, limits.acceleration * period);
-            now.turn = toward(now.turn, asked.turn, limits.turn_acceleration * period);
-        } else {
-            *now = Velocity::default();
-        }
     }
 
     /// A standing body's rest creeps to the middle of the feet.

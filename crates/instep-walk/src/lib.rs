@@ -2,9 +2,10 @@
 //!
 //! - [`Walker`]: the whole, as a [`instep_robot::control::Controller`].
 //! - [`StateEstimate`]: what walking knows of its robot, the seam between estimator and controller.
-//! - [`gait`]: stands, starts (`start.rs`), steps, stops; [`footsteps`] chooses where to, [`swing`] how, [`whole_body`] with which torques,
-//!   by the quadratic program of [`instep_qp`].
+//! - [`gait`]: stands, starts ([`start`]), steps, stops; [`footsteps`] chooses where to, [`swing`] how, [`whole_body`] with which
+//!   torques, by the quadratic program of [`instep_qp`].
 //! - [`pattern`]: the walk of robots whose drives are position servos.
+//! - [`ball`]: where a resting ball is, from sights of it on the way.
 //! - [`plmk`]: when a kick is locked onto a step, and where it strikes; [`in_gait`] walks up and has it done.
 //! - [`settings`]: all numbers, with defaults that follow from the robot's size.
 //!
@@ -21,7 +22,6 @@ pub mod offsets;
 pub mod pattern;
 pub mod plmk;
 pub mod settings;
-
 pub mod start;
 mod state;
 pub mod swing;

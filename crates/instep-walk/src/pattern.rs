@@ -132,24 +132,8 @@ impl Pattern {
             .iter()
             .map(|contact| (data.point(&contact.at) - soles[contact.leg as usize]).x.abs())
             .fold(0.0, f64::max);
-        let pendulum = Pendulum {
-            lambda: (GRAVITY / gait.height).sqrt(),
-            step_time: gait.step_time,
-            width: gait.width,
-            alpha: gait.alpha,
-        };
+        let pendulum = Pendulum::of(gait);
         let zero = Vector3::zeros();
-        let view = GaitView {
-            mode: Mode::Stand,
-            phase: 0.0,
-            momentum: Vector2::zeros(),
-            wanted: Vector2::zeros(),
-            foothold: zero,
-            heading: 0.0,
-            com: zero,
-            com_velocity: zero,
-            feet: [zero; 2],
-        };
         let (joints, nv) = (robot.joints.len(), robot.nv());
         let apart = soles[1] - soles[0];
         let com = data.com() - soles[0];
@@ -187,7 +171,7 @@ impl Pattern {
             touchdowns: [None; 2],
             counts: Counts::default(),
             footstep: None,
-            view,
+            view: GaitView::default(),
             settings,
             robot,
         })
@@ -281,19 +265,10 @@ impl Pattern {
 
     /// The velocity goes toward what was asked as fast as the limits allow.
     fn approach(&mut self, period: f64) {
-        let limits = &self.settings.limits;
-        let toward = |from: f64, to: f64, most: f64| {
-            let most = if to.abs() < from.abs() { BRAKE * most } else { most };
-            from + (to - from).clamp(-most, most)
+        self.velocity = match self.mode {
+            Mode::Step { .. } => self.settings.limits.approach(self.velocity, self.asked, BRAKE, period),
+            _ => Velocity::default(),
         };
-        if matches!(self.mode, Mode::Step { .. }) {
-            let (now, asked) = (&mut self.velocity, &self.asked);
-            now.x = toward(now.x, asked.x, limits.acceleration * period);
-            now.y = toward(now.y, asked.y, limits.acceleration * period);
-            now.turn = toward(now.turn, asked.turn, limits.turn_acceleration * period);
-        } else {
-            self.velocity = Velocity::default();
-        }
     }
 
     /// Changes of the mode: start, touchdown, stop.
@@ -487,7 +462,6 @@ impl Pattern {
         self.q[..3].copy_from_slice(origin.as_slice());
         self.q[3..7].copy_from_slice(&[rotation.w, rotation.i, rotation.j, rotation.k]);
         self.q[7..].copy_from_slice(&self.angles);
-        self.data.set_position(&self.q);
         self.data.set_state(&self.q, &self.still);
         let weight = self.robot.mass() * GRAVITY;
         // Where the ground pushes: under the support sole; on both feet where a shift needs it.

@@ -369,6 +369,20 @@ impl WalkSettings {
 }
 
 impl Limits {
+    /// `now` after `period` (s) on its way to `asked`: as fast as is allowed, and `brake` times as fast where it slows down.
+    #[must_use]
+    pub fn approach(&self, now: Velocity, asked: Velocity, brake: f64, period: f64) -> Velocity {
+        let toward = |from: f64, to: f64, rate: f64| {
+            let most = rate * period * if to.abs() < from.abs() { brake } else { 1.0 };
+            from + (to - from).clamp(-most, most)
+        };
+        Velocity {
+            x: toward(now.x, asked.x, self.acceleration),
+            y: toward(now.y, asked.y, self.acceleration),
+            turn: toward(now.turn, asked.turn, self.turn_acceleration),
+        }
+    }
+
     /// The velocity nearest to `asked` that the robot is allowed: an ellipse ahead and across, and the turn.
     #[must_use]
     pub fn clip(&self, asked: Velocity) -> Velocity {

@@ -1,7 +1,8 @@
 //! The state of a walking robot from its senses: the filter of [`super::filter`] on heel and toe of each foot.
 //!
 //! Points are the middles of the foremost and the hindmost contact points of a foot; one stands while it bears its share of the
-//! weight, with hysteresis. A robot that has stood on all of them for a while without turning is at rest, which tells the gyro's bias. Angles, rates and speeds of the joints are taken as read. How good the senses are follows from the robot's
+//! weight, with hysteresis. A robot that has stood on all of them for a while without turning is at rest, which tells the gyro's bias
+//! about the vertical. Angles, rates and speeds of the joints are taken as read. How good the senses are follows from the robot's
 //! `[senses]`: noise as stated there, with floors, since no sensor is perfect.
 
 use std::sync::Arc;
@@ -28,7 +29,6 @@ const LEAST: [f64; 3] = [0.002, 0.02, 0.001];
 const START: [f64; 3] = [0.01, 0.002, 0.02];
 /// How far the biases wander, as a share of their deviation in the square root of a second.
 const WANDER: f64 = 0.02;
-
 /// How long a robot must not have turned to be at rest, s; how fast it may seem to turn by a gyro of known bias, rad/s; lag of what it
 /// seems, s; and how a standing body sways after all, rad/s/sqrt(Hz).
 const REST: [f64; 4] = [0.2, 0.02, 0.1, 0.0002];
@@ -166,4 +166,64 @@ fn filter(robot: &Robot, orientation: [f64; 4], position: Vector3<f64>, velocity
         UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z)).to_rotation_matrix().into_inner();
     let spread = [senses.tilt_bias.max(START[0]), 0.01, 0.001, biases[0], biases[1]];
     ContactEkf::new(noise, turn, velocity, position, spread)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A robot that stands still on sensors of `load` (N) each, its gyro off by `bias` (rad/s) about the vertical.
+    fn standing(name: &str, load: f64, bias: f64, seconds: f64) -> (Estimator, StateEstimate) {
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots").join(name);
+        let robot = Arc::new(Robot::load(&folder).unwrap());
+        let mut estimator = Estimator::new(Arc::clone(&robot));
+        let mut state = StateEstimate::standing(&robot);
+        let mut sensors = Sensors {
+            joint_positions: robot.stand[7..].to_vec(),
+            joint_velocities: vec![0.0; robot.joints.len()],
+            orientation: [1.0, 0.0, 0.0, 0.0],
+            gyro: [0.0, 0.0, bias],
+            accelerometer: [0.0, 0.0, GRAVITY],
+            contact_forces: vec![load; robot.contacts.len()],
+            ..Sensors::default()
+        };
+        for tick in 1..=(seconds / 0.002) as usize {
+            sensors.time = 0.002 * tick as f64;
+            estimator.update(&sensors, &mut state);
+        }
+        (estimator, state)
+    }
+
+    #[test]
+    fn a_robot_at_rest_finds_its_gyros_bias_about_the_vertical_and_keeps_its_heading() {
+        for bias in [0.006, -0.009] {
+            let (estimator, state) = standing("nao", 6.5, bias, 1.5);
+            let found = estimator.filter().unwrap().gyro_bias.z;
+            assert!((found - bias).abs() < 0.05 * bias.abs(), "{found} for {bias}");
+            assert!(state.contact == [true; 2] && state.q[6].abs() < 2e-3, "{state:?}");
+        }
+    }
+
+    #[test]
+    fn a_robot_that_turns_is_not_at_rest() {
+        let (estimator, _) = standing("nao", 6.5, 0.3, 1.0);
+        let with_feet = estimator.filter().unwrap().covariance()[(21 + 2, 21 + 2)];
+        let (estimator, _) = standing("nao", 6.5, 0.0, 1.0);
+        let at_rest = estimator.filter().unwrap().covariance()[(21 + 2, 21 + 2)];
+        assert!(with_feet > 4.0 * at_rest, "{with_feet} {at_rest}");
+    }
+
+    #[test]
+    fn what_a_sensor_reads_by_its_zero_alone_is_no_load() {
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots/nao");
+        let robot = Robot::load(&folder).unwrap();
+        // More than the share of the weight from which a foot stood, once it did: that left it standing in the air.
+        let off = 1.4 * robot.senses.foot_offset;
+        let foot = robot.contacts.len() as f64 / 2.0;
+        assert!(foot * off > LOAD[1] * robot.mass() * GRAVITY);
+        let (_, state) = standing("nao", off, 0.0, 0.01);
+        assert_eq!(state.contact, [false; 2]);
+        let (_, state) = standing("nao", 3.0, 0.0, 0.01);
+        assert_eq!(state.contact, [true; 2]);
+    }
 }

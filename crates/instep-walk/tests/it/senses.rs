@@ -20,11 +20,13 @@ struct Walked {
     mean: [f64; 2],
     velocity_error: f64,
     stop: f64,
+    /// How far the feet are apart ahead at the end, m.
+    stagger: f64,
     allocations: usize,
 }
 
-/// Walks `name` with `velocity` for `duration` (s), ticked every `period` (s), then asks for a stop.
-fn walk(name: &str, velocity: Velocity, duration: f64, period: f64, seed: u64) -> Walked {
+/// `name` as built in its stand, with its sensors and its walker.
+fn as_built(name: &str, seed: u64) -> (World, SensorSuite, Walker) {
     let robot = robot(name);
     let mut settings =
         WorldSettings { drives: Fidelity::AsBuilt, senses: Fidelity::AsBuilt, ..WorldSettings::default() };
@@ -33,8 +35,13 @@ fn walk(name: &str, velocity: Velocity, duration: f64, period: f64, seed: u64) -
     world.reset(&robot.stand, &vec![0.0; robot.nv()], &BallState::at_rest([50.0, 0.0, 0.11])).unwrap();
     let mut suite = SensorSuite::new(&mut world, seed);
     suite.sense(&world);
-    let mut walker = Walker::load(Arc::clone(&robot)).unwrap();
-    let (mut sensors, mut command) = (Sensors::default(), JointCommand::zeros(robot.joints.len()));
+    (world, suite, Walker::load(robot).unwrap())
+}
+
+/// Walks `name` with `velocity` for `duration` (s), ticked every `period` (s), then asks for a stop.
+fn walk(name: &str, velocity: Velocity, duration: f64, period: f64, seed: u64) -> Walked {
+    let (mut world, mut suite, mut walker) = as_built(name, seed);
+    let (mut sensors, mut command) = (Sensors::default(), JointCommand::zeros(world.robot().joints.len()));
     let (mut way, mut squares, mut samples, mut stop, mut allocated) = ([0.0; 2], 0.0, 0.0, duration + 2.0, 0);
     let every = (period / 0.001_f64).round() as usize;
     for step in 0..((duration + 2.0) / 0.001) as usize {
@@ -68,6 +75,12 @@ fn walk(name: &str, velocity: Velocity, duration: f64, period: f64, seed: u64) -
         mean: way.map(|way| way / (0.5 * duration)),
         velocity_error: f64::sqrt(squares / samples),
         stop: stop - duration,
+        stagger: {
+            let view = walker.view();
+            let (sin, cos) = view.heading.sin_cos();
+            let apart = view.feet[0] - view.feet[1];
+            (apart.x * cos + apart.y * sin).abs()
+        },
         allocations: allocated,
     }
 }
@@ -92,7 +105,7 @@ fn robots_walk_on_position_servos_at_their_own_rate() {
             println!("{walked:?}");
             assert!((walked.mean[0] - speed).abs() < 0.15 * speed && walked.mean[1].abs() < 0.06, "{name}: {walked:?}");
             // A step or two more than torque drives need, until the feet are side by side.
-            assert!(walked.stop < 1.8, "{name}: {walked:?}");
+            assert!(walked.stop < 1.8 && walked.stagger < 0.025, "{name}: {walked:?}");
             assert_eq!(walked.allocations, 0);
         }
     }
@@ -103,16 +116,8 @@ fn robots_walk_on_position_servos_at_their_own_rate() {
 #[test]
 fn a_standing_robot_does_not_turn_and_knows_it() {
     for seed in 75..78 {
-        let robot = robot("artemis");
-        let mut settings =
-            WorldSettings { drives: Fidelity::AsBuilt, senses: Fidelity::AsBuilt, ..WorldSettings::default() };
-        settings.step.tick = 0.001;
-        let mut world = World::new(Arc::clone(&robot), &settings).unwrap();
-        world.reset(&robot.stand, &vec![0.0; robot.nv()], &BallState::at_rest([50.0, 0.0, 0.11])).unwrap();
-        let mut suite = SensorSuite::new(&mut world, seed);
-        suite.sense(&world);
-        let mut walker = Walker::load(Arc::clone(&robot)).unwrap();
-        let (mut sensors, mut command) = (Sensors::default(), JointCommand::zeros(robot.joints.len()));
+        let (mut world, mut suite, mut walker) = as_built("artemis", seed);
+        let (mut sensors, mut command) = (Sensors::default(), JointCommand::zeros(world.robot().joints.len()));
         for _ in 0..10_000 {
             suite.read_into(world.time(), &mut sensors);
             walker.tick(&sensors, &mut command);
