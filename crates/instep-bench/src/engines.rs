@@ -340,7 +340,24 @@ impl Subject {
     fn walk_up(&self, file: &str, text: &str) -> Made {
         let settings: WalkUpSettings = toml::from_str(text)
             .map_err(|e| BenchError::File { file: file.into(), detail: e.to_string().trim_end().to_owned() })?;
+        let wrong = |field: &str, found: String, expected: &str| {
+            Err(BenchError::Field { file: file.into(), field: field.into(), found, expected: expected.into() })
+        };
         let inner = entry(&settings.engine)?;
+        // One that walks itself would walk for ever.
+        if !matches!(inner.family(), "dynamic" | "preview" | "adaptive") {
+            return wrong(
+                "engine",
+                settings.engine,
+                "an engine that kicks from the stand: dynamic, preview or adaptive",
+            );
+        }
+        if !settings.ball.iter().all(|x| x.is_finite()) {
+            return wrong("ball", format!("{:?}", settings.ball), "two numbers, m");
+        }
+        if !(settings.speed > 0.0 && settings.speed.is_finite()) {
+            return wrong("speed", settings.speed.to_string(), "a speed above 0 m/s");
+        }
         let engine = (inner.make)(self, inner.file, &self.settings(inner.name)?)?;
         Ok(Box::new(WalkUp::new(&self.robot, engine, &settings, self.footprint)?))
     }

@@ -2,9 +2,8 @@
 
 use std::sync::Arc;
 
-use instep_bench::Scenario;
-use instep_bench::Subject;
 use instep_bench::cell::{CellKey, run_cell};
+use instep_bench::{BenchError, Scenario, Subject};
 use instep_kick::{KickRequest, KickStatus, Refusal};
 use instep_robot::control::{JointCommand, Sensors};
 use instep_sim::sensors::SensorSuite;
@@ -103,4 +102,24 @@ fn what_it_cannot_is_refused_before_it_walks() {
     assert!(nothing.is_err());
     engine.plan(&KickRequest::new([1.0, 0.0], 0.0, 0.6), &sensors).unwrap();
     assert_eq!(engine.plan(&KickRequest::new([1.0, 0.0], 0.0, 0.6), &sensors), Err(Refusal::Busy));
+}
+
+#[test]
+fn settings_that_cannot_be_are_named() {
+    let good = std::fs::read_to_string(root("robots/nao/walk-up.toml")).unwrap();
+    for (from, to, field) in [
+        ("\"dynamic\"", "\"walk-up\"", "engine"),
+        ("\"dynamic\"", "\"policy\"", "engine"),
+        ("speed = 0.8", "speed = -1.0", "speed"),
+        ("[2.0, 0.1]", "[nan, 0.1]", "ball"),
+    ] {
+        let text = good.replace(from, to);
+        assert_ne!(text, good);
+        let subject = Subject::load(&root("robots"), "nao").unwrap().with_settings("walk-up", text).unwrap();
+        let error = subject.engine("walk-up").err().unwrap();
+        assert!(matches!(&error, BenchError::Field { field: named, .. } if named == field), "{error}");
+    }
+    let text = good.replace("speed", "sped");
+    let subject = Subject::load(&root("robots"), "nao").unwrap().with_settings("walk-up", text).unwrap();
+    assert!(matches!(subject.engine("walk-up").err(), Some(BenchError::File { .. })));
 }
